@@ -1,8 +1,8 @@
 """The synthetic regression problems of Ting et al. (2006), §IV-A: noisy, redundant and irrelevant inputs.
 
 Needs NumPy only. Ten relevant inputs are drawn from ``N(0, A Aᵀ)`` with ``A`` standard normal and explain the output by
-``b = [1, ..., 10]``; redundant inputs are convex combinations of the noisy relevant ones; the rest is noise. The paper does not say
-whether its signal-to-noise ratios compare variances or standard deviations; here they compare variances (power).
+``b = [1, ..., 10]``; redundant inputs are convex combinations of the noisy relevant ones; the rest is noise. The paper
+does not say whether its signal-to-noise ratios compare variances or standard deviations; here they compare variances.
 """
 
 from __future__ import annotations
