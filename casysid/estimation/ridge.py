@@ -1,0 +1,74 @@
+"""Ridge towards the prior, its strength chosen by cross-validation over blocks of time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from casysid.arrays import Array
+from casysid.errors import ParameterError
+from casysid.estimation.base import Estimate
+from casysid.estimation.standardise import StandardisedProblem, standardise
+from casysid.moments import Moments
+
+STRENGTHS = tuple(np.geomspace(1e-8, 1e1, 28).tolist())
+
+
+@dataclass(frozen=True)
+class Ridge:
+    """Weighted least squares with ``strength ‖β‖²`` on the standardised distance ``β`` from the prior.
+
+    Attributes:
+        strength: Penalty on columns and target scaled to unit root mean square; None chooses it by cross-validation.
+        folds: Contiguous folds of blocks in the cross-validation.
+    """
+
+    strength: float | None = None
+    folds: int = 5
+    name: ClassVar[str] = "ridge"
+
+    def __post_init__(self) -> None:
+        if self.strength is not None and not (np.isfinite(self.strength) and self.strength >= 0):
+            raise ParameterError(f"ridge: strength must be a finite number >= 0 or None; got {self.strength}")
+        if self.folds < 2:
+            raise ParameterError(f"ridge: cross-validation wants at least 2 folds; got {self.folds}")
+
+    def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
+        """Parameters between the prior and weighted least squares, as far as the data's own prediction error asks.
+
+        Raises:
+            ParameterError: The strength is to be chosen and there is a single block.
+        """
+        problem = standardise(moments, prior)
+        if problem.is_degenerate:
+            return problem.degenerate_estimate(self.name)
+        strength = self.strength if self.strength is not None else choose_strength(problem, self.folds)
+        normal = problem.normal
+        values, vectors = np.linalg.eigh(normal.xx)
+        shrunk = np.maximum(values, 0.0) + max(strength, np.finfo(np.float64).eps)
+        coefficients = vectors @ ((vectors.T @ normal.xy) / shrunk)
+        noise = max(normal.residual_energy(coefficients), 0.0) / max(float(problem.count.sum()), 1.0)
+        covariance = (vectors * (noise / shrunk)) @ vectors.T
+        freedom = float((np.maximum(values, 0.0) / shrunk).sum())
+        return problem.to_estimate(
+            self.name, coefficients, covariance, diagnostics={"strength": strength, "effective_parameters": freedom}
+        )
+
+
+def choose_strength(problem: StandardisedProblem, folds: int) -> float:
+    """The strength of least squared error on blocks left out, folds being contiguous in time."""
+    blocks = len(problem.count)
+    if blocks < 2:
+        raise ParameterError("ridge: choosing the strength needs at least 2 blocks of time; give more blocks or a strength")
+    error = np.zeros(len(STRENGTHS))
+    for fold in np.array_split(np.arange(blocks), min(folds, blocks)):
+        training = problem.normal_of(np.setdiff1d(np.arange(blocks), fold))
+        held_out = problem.normal_of(fold)
+        share = training.count / problem.count.sum()
+        values, vectors = np.linalg.eigh(training.xx / share)
+        projected = vectors.T @ (training.xy / share)
+        for k, strength in enumerate(STRENGTHS):
+            error[k] += held_out.residual_energy(vectors @ (projected / (np.maximum(values, 0.0) + strength)))
+    return STRENGTHS[int(np.argmin(error))]
