@@ -1,0 +1,159 @@
+"""From a ``pin.Model`` to a :class:`~casysid.robot.model.Robot`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from casysid.arrays import Array, frozen
+from casysid.errors import RobotError
+from casysid.robot.checks import InertiaFault
+from casysid.robot.model import Joint, JointKind, Robot, SourceFormat
+
+_UNALIGNED = {
+    "JointModelRevoluteUnaligned": JointKind.REVOLUTE,
+    "JointModelRevoluteUnboundedUnaligned": JointKind.CONTINUOUS,
+    "JointModelPrismaticUnaligned": JointKind.PRISMATIC,
+}
+_ALIGNED = {
+    "JointModelR": JointKind.REVOLUTE,
+    "JointModelRUB": JointKind.CONTINUOUS,
+    "JointModelP": JointKind.PRISMATIC,
+}
+_COMPOUND = {
+    "JointModelSpherical": JointKind.SPHERICAL,
+    "JointModelPlanar": JointKind.PLANAR,
+    "JointModelFreeFlyer": JointKind.FREE_FLYER,
+}
+_CHANNELS = {
+    JointKind.SPHERICAL: ("qx", "qy", "qz", "qw"),
+    JointKind.PLANAR: ("x", "y", "theta"),
+    JointKind.FREE_FLYER: ("x", "y", "z", "qx", "qy", "qz", "qw"),
+}
+_DOFS = {
+    JointKind.SPHERICAL: ("wx", "wy", "wz"),
+    JointKind.PLANAR: ("vx", "vy", "wz"),
+    JointKind.FREE_FLYER: ("vx", "vy", "vz", "wx", "wy", "wz"),
+}
+_BEYOND_ANY_LIMIT = 1e300
+
+
+def assemble_robot(
+    model: Any,
+    links: Sequence[str | None],
+    *,
+    name: str,
+    source: Path,
+    source_format: SourceFormat,
+    faults: Sequence[InertiaFault] = (),
+    floating_base: bool = False,
+    locked: Sequence[tuple[str, float]] = (),
+) -> Robot:
+    """The robot of a model that is its own from here on.
+
+    Args:
+        model: ``pin.Model``, not to be changed by the caller any more.
+        links: The link that each joint carries, universe left out.
+        name: Name of the robot.
+        source: File it came from.
+        source_format: Format of that file.
+        faults: Complaints about the file's inertial parameters.
+        floating_base: Whether a free joint was added.
+        locked: Joints that were held.
+
+    Raises:
+        RobotError: There is no joint, or one of an unknown kind.
+    """
+    joints = _list_joints(model, links, source)
+    lower, upper = _position_limits(model, joints)
+    inertias = [model.inertias[k + 1] for k, joint in enumerate(joints) if joint.link is not None]
+    return Robot(
+        name=name,
+        source=source,
+        source_format=source_format,
+        model=model,
+        joints=joints,
+        links=tuple(joint.link for joint in joints if joint.link is not None),
+        dofs=_suffixed(joints, _DOFS),
+        channels=_suffixed(joints, _CHANNELS),
+        inertial_parameters=frozen(np.concatenate([inertia.toDynamicParameters() for inertia in inertias])),
+        damping=frozen(model.damping),
+        dry_friction=frozen(model.upperDryFrictionLimit),
+        armature=frozen(model.armature),
+        position_lower=lower,
+        position_upper=upper,
+        velocity_limit=_unbounded(model.upperVelocityLimit),
+        effort_limit=_unbounded(model.upperEffortLimit),
+        gravity=frozen(model.gravity.linear),
+        faults=tuple(faults),
+        floating_base=floating_base,
+        locked=tuple(locked),
+    )
+
+
+def _list_joints(model: Any, links: Sequence[str | None], source: Path) -> tuple[Joint, ...]:
+    if model.njoints == 1:
+        raise RobotError(f"{source}: no joint moves; a robot needs at least one joint that is not fixed or locked")
+    joints: list[Joint] = []
+    first_channel = 0
+    for k in range(1, model.njoints):
+        pin_joint, joint_name = model.joints[k], str(model.names[k])
+        kind, axis = _classify(pin_joint, joint_name, source)
+        count = len(_CHANNELS.get(kind, (joint_name,)))
+        joints.append(
+            Joint(
+                name=joint_name,
+                kind=kind,
+                parent=int(model.parents[k]) - 1,
+                placement=model.jointPlacements[k].copy(),
+                axis=axis,
+                q=slice(pin_joint.idx_q, pin_joint.idx_q + pin_joint.nq),
+                v=slice(pin_joint.idx_v, pin_joint.idx_v + pin_joint.nv),
+                channels=slice(first_channel, first_channel + count),
+                link=links[k - 1],
+            )
+        )
+        first_channel += count
+    return tuple(joints)
+
+
+def _classify(pin_joint: Any, name: str, source: Path) -> tuple[JointKind, Array]:
+    kind_name = str(pin_joint.shortname())
+    if kind_name in _COMPOUND:
+        return _COMPOUND[kind_name], frozen(np.zeros(3))
+    if kind_name in _UNALIGNED:
+        return _UNALIGNED[kind_name], frozen(np.ravel(pin_joint.extract().axis))
+    if kind_name[:-1] in _ALIGNED and kind_name[-1] in "XYZ":
+        return _ALIGNED[kind_name[:-1]], frozen(np.eye(3)["XYZ".index(kind_name[-1])])
+    raise RobotError(
+        f"{source}: joint '{name}' is a Pinocchio {kind_name}, which is not supported; "
+        f"supported are {', '.join(kind.value for kind in JointKind)} joints"
+    )
+
+
+def _suffixed(joints: Sequence[Joint], suffixes: dict[JointKind, tuple[str, ...]]) -> tuple[str, ...]:
+    return tuple(
+        name
+        for joint in joints
+        for name in (
+            [f"{joint.name}_{suffix}" for suffix in suffixes[joint.kind]] if joint.kind in suffixes else [joint.name]
+        )
+    )
+
+
+def _position_limits(model: Any, joints: Sequence[Joint]) -> tuple[Array, Array]:
+    lower = np.full(joints[-1].channels.stop, -np.inf)
+    upper = np.full(joints[-1].channels.stop, np.inf)
+    for joint in joints:
+        if joint.kind in (JointKind.REVOLUTE, JointKind.PRISMATIC):
+            lower[joint.channels] = _unbounded(model.lowerPositionLimit[joint.q])
+            upper[joint.channels] = _unbounded(model.upperPositionLimit[joint.q])
+    return frozen(lower), frozen(upper)
+
+
+def _unbounded(limits: Array) -> Array:
+    values = np.array(limits, dtype=np.float64)
+    return frozen(np.where(np.abs(values) >= _BEYOND_ANY_LIMIT, np.copysign(np.inf, values), values))

@@ -1,0 +1,52 @@
+"""Joints that are held: what they carry becomes part of the link before them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pinocchio as pin
+
+from casysid.errors import RobotError
+
+
+def lockable_values(
+    locked: Mapping[str, float] | None, joints: Collection[str], source: Path
+) -> tuple[tuple[str, float], ...]:
+    """The joints to lock with their positions, checked.
+
+    Raises:
+        RobotError: A name is not among ``joints``, or a position is not a finite number.
+    """
+    held = []
+    for name, value in (locked or {}).items():
+        if name not in joints:
+            raise RobotError(f"{source}: locked joint '{name}' does not exist; moving joints: {', '.join(joints)}")
+        try:
+            position = float(value)
+        except (TypeError, ValueError) as error:
+            raise RobotError(f"{source}: locked joint '{name}': wanted a position [rad or m]; got {value!r}") from error
+        if not math.isfinite(position):
+            raise RobotError(f"{source}: locked joint '{name}': wanted a finite position [rad or m]; got {value!r}")
+        held.append((name, position))
+    return tuple(held)
+
+
+def lock_joints(model: Any, held: Sequence[tuple[str, float]], source: Path) -> Any:
+    """The ``pin.Model`` without the held joints.
+
+    Raises:
+        RobotError: A held joint has more than one degree of freedom.
+    """
+    if not held:
+        return model
+    configuration = pin.neutral(model)
+    for name, position in held:
+        joint = model.joints[model.getJointId(name)]
+        if joint.nv != 1:
+            raise RobotError(f"{source}: joint '{name}' cannot be locked: only joints with one degree of freedom can")
+        values = [position] if joint.nq == 1 else [math.cos(position), math.sin(position)]
+        configuration[joint.idx_q : joint.idx_q + joint.nq] = values
+    return pin.buildReducedModel(model, [model.getJointId(name) for name, _ in held], configuration)

@@ -1,0 +1,112 @@
+"""XML read with its places in the text, so that a number can be replaced and all else stays as it was written."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+from casysid.errors import RobotError
+
+_START_TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=>]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*/?>""")
+
+
+@dataclass(eq=False)
+class Element:
+    """One element of the document and the bytes it occupies.
+
+    Attributes:
+        tag: Its name, prefix included.
+        attributes: Its attributes, in the order of the text.
+        line: Line of the start tag, counted from 1.
+        start: Offset of its first byte.
+        open_end: Offset behind the start tag.
+        end: Offset behind the element.
+        parent: The element around it.
+        children: The elements in it.
+    """
+
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    start: int
+    open_end: int
+    end: int = -1
+    parent: Element | None = None
+    children: list[Element] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        """The ``name`` attribute, empty when there is none."""
+        return self.attributes.get("name", "")
+
+    def find(self, tag: str) -> Element | None:
+        """The first child with this tag."""
+        return next((child for child in self.children if child.tag == tag), None)
+
+    def find_all(self, tag: str) -> list[Element]:
+        """All children with this tag."""
+        return [child for child in self.children if child.tag == tag]
+
+    def walk(self) -> Iterator[Element]:
+        """This element and everything below it, in the order of the text."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+
+def read_bytes(path: Path) -> bytes:
+    """The file's bytes.
+
+    Raises:
+        RobotError: It is not there, or is no readable file.
+    """
+    if not path.exists():
+        raise RobotError(f"{path}: no such file (looked in {path.parent.resolve()})")
+    if path.is_dir():
+        raise RobotError(f"{path}: is a folder; give the URDF or MJCF file in it")
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise RobotError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def parse_xml(text: bytes, path: Path) -> Element:
+    """The root element of an XML text; ``path`` is for messages only.
+
+    Raises:
+        RobotError: The text is not well-formed XML, or not in an encoding that keeps ASCII as it is.
+    """
+    if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise RobotError(f"{path}: is encoded as UTF-16; save it as UTF-8")
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    top = Element("", {}, 0, 0, 0)
+    stack = [top]
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        start = parser.CurrentByteIndex
+        match = _START_TAG.match(text, start)
+        if match is None:
+            raise RobotError(f"{path}:{parser.CurrentLineNumber}: cannot read the tag <{tag}>")
+        element = Element(tag, attributes, parser.CurrentLineNumber, start, match.end(), parent=stack[-1])
+        stack[-1].children.append(element)
+        stack.append(element)
+
+    def finish(tag: str) -> None:
+        element = stack.pop()
+        closed_at_once = text[element.open_end - 2 : element.open_end] == b"/>"
+        element.end = element.open_end if closed_at_once else text.index(b">", parser.CurrentByteIndex) + 1
+
+    parser.StartElementHandler = begin
+    parser.EndElementHandler = finish
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        reason = expat.errors.messages[error.code]
+        raise RobotError(f"{path}:{error.lineno}: not well-formed XML ({reason}, column {error.offset + 1})") from error
+    root = top.children[0]
+    root.parent = None
+    return root
