@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
 
 from casysid.arrays import Array, frozen
-from casysid.errors import RobotError
+from casysid.errors import ParameterError, RobotError
 from casysid.robot.checks import InertiaFault
 from casysid.robot.model import Joint, JointKind, Robot, SourceFormat
 
@@ -92,6 +95,60 @@ def assemble_robot(
         floating_base=floating_base,
         locked=tuple(locked),
     )
+
+
+def replace_parameters(
+    robot: Robot,
+    inertial_parameters: npt.ArrayLike | None,
+    damping: npt.ArrayLike | None,
+    dry_friction: npt.ArrayLike | None,
+    armature: npt.ArrayLike | None,
+) -> Robot:
+    """See :meth:`Robot.with_parameters`."""
+    inertial = _chosen("inertial_parameters", inertial_parameters, robot.inertial_parameters)
+    viscous = _chosen("damping", damping, robot.damping)
+    coulomb = _chosen("dry_friction", dry_friction, robot.dry_friction)
+    rotor = _chosen("armature", armature, robot.armature)
+    model = robot.model.copy()
+    carrying = [k for k, joint in enumerate(robot.joints) if joint.link is not None]
+    for k, link, theta in zip(carrying, robot.links, inertial.reshape(-1, 10), strict=True):
+        model.inertias[k + 1] = inertia_from_parameters(theta, link)
+    model.damping, model.armature = viscous.copy(), rotor.copy()
+    model.upperDryFrictionLimit, model.lowerDryFrictionLimit = coulomb.copy(), -coulomb
+    return dataclasses.replace(
+        robot,
+        model=model,
+        inertial_parameters=inertial,
+        damping=viscous,
+        dry_friction=coulomb,
+        armature=rotor,
+        faults=robot.faults if inertial_parameters is None else (),
+    )
+
+
+def inertia_from_parameters(theta: Array, link: str) -> Any:
+    """The ``pin.Inertia`` of ten parameters at the joint frame.
+
+    Raises:
+        ParameterError: The mass is zero, but the first moment is not: no inertia has such parameters.
+    """
+    if theta[0] != 0.0:
+        return pin.Inertia.FromDynamicParameters(theta)
+    if theta[1:4].any():
+        raise ParameterError(f"link '{link}': mass 0 with first moment {theta[1:4]} kg m is no body; project it first")
+    ixx, ixy, iyy, ixz, iyz, izz = theta[4:]
+    return pin.Inertia(0.0, np.zeros(3), np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]))
+
+
+def _chosen(name: str, values: npt.ArrayLike | None, default: Array) -> Array:
+    if values is None:
+        return default
+    chosen = frozen(values)
+    if chosen.shape != default.shape:
+        raise ParameterError(f"{name}: wanted shape {default.shape}; got {chosen.shape}")
+    if not np.isfinite(chosen).all():
+        raise ParameterError(f"{name}: must be finite; number {int(np.argmin(np.isfinite(chosen)))} is not")
+    return chosen
 
 
 def _list_joints(model: Any, links: Sequence[str | None], source: Path) -> tuple[Joint, ...]:

@@ -152,6 +152,20 @@ class Robot:
         return read_urdf(Path(path), gravity=gravity, floating_base=floating_base, locked=locked)
 
     @classmethod
+    def from_mjcf(
+        cls,
+        path: str | Path,
+        *,
+        gravity: npt.ArrayLike | None = None,
+        floating_base: bool = False,
+        locked: Mapping[str, float] | None = None,
+    ) -> Robot:
+        """The robot in an MJCF file, as MuJoCo compiles it. Arguments as for :meth:`from_file`."""
+        from casysid.robot.mjcf import read_mjcf
+
+        return read_mjcf(Path(path), gravity=gravity, floating_base=floating_base, locked=locked)
+
+    @classmethod
     def from_pin(cls, model: Any, *, name: str = "robot", source_format: SourceFormat = "urdf") -> Robot:
         """The robot of a ``pin.Model`` built in memory, copied; every joint carries a link ``<joint>_link``.
 
@@ -162,3 +176,26 @@ class Robot:
 
         links = [f"{joint}_link" for joint in list(model.names)[1:]]
         return assemble_robot(model.copy(), links, name=name, source=Path(name), source_format=source_format)
+
+    def with_parameters(
+        self,
+        *,
+        inertial_parameters: npt.ArrayLike | None = None,
+        damping: npt.ArrayLike | None = None,
+        dry_friction: npt.ArrayLike | None = None,
+        armature: npt.ArrayLike | None = None,
+    ) -> Robot:
+        """The same robot with other parameters, in its fields and in its model; None keeps what is there.
+
+        Args:
+            inertial_parameters: Shape (10 links,), physically consistent or not.
+            damping: Shape (nv,).
+            dry_friction: Shape (nv,).
+            armature: Shape (nv,).
+
+        Raises:
+            ParameterError: A shape does not fit, a number is not finite, or a link without mass has a first moment.
+        """
+        from casysid.robot.assembly import replace_parameters
+
+        return replace_parameters(self, inertial_parameters, damping, dry_friction, armature)
