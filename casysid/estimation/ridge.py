@@ -10,8 +10,9 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.errors import ParameterError
 from casysid.estimation.base import Estimate
-from casysid.estimation.standardise import StandardisedProblem, standardise
-from casysid.moments import Moments
+from casysid.estimation.cross_validation import cross_validate
+from casysid.estimation.standardise import StandardisedProblem, seen_directions, standardise
+from casysid.moments import Moments, NormalEquations
 
 STRENGTHS = tuple(np.geomspace(1e-8, 1e1, 28).tolist())
 
@@ -46,12 +47,12 @@ class Ridge:
             return problem.degenerate_estimate(self.name)
         strength = self.strength if self.strength is not None else choose_strength(problem, self.folds)
         normal = problem.normal
-        values, vectors = np.linalg.eigh(normal.xx)
-        shrunk = np.maximum(values, 0.0) + max(strength, np.finfo(np.float64).eps)
+        values, vectors = seen_directions(normal.xx)
+        shrunk = values + strength
         coefficients = vectors @ ((vectors.T @ normal.xy) / shrunk)
         noise = max(normal.residual_energy(coefficients), 0.0) / max(float(problem.count.sum()), 1.0)
         covariance = (vectors * (noise / shrunk)) @ vectors.T
-        freedom = float((np.maximum(values, 0.0) / shrunk).sum())
+        freedom = float((values / shrunk).sum())
         return problem.to_estimate(
             self.name, coefficients, covariance, diagnostics={"strength": strength, "effective_parameters": freedom}
         )
@@ -59,16 +60,12 @@ class Ridge:
 
 def choose_strength(problem: StandardisedProblem, folds: int) -> float:
     """The strength of least squared error on blocks left out, folds being contiguous in time."""
-    blocks = len(problem.count)
-    if blocks < 2:
-        raise ParameterError("ridge: choosing the strength needs at least 2 blocks of time; give more blocks or a strength")
-    error = np.zeros(len(STRENGTHS))
-    for fold in np.array_split(np.arange(blocks), min(folds, blocks)):
-        training = problem.normal_of(np.setdiff1d(np.arange(blocks), fold))
-        held_out = problem.normal_of(fold)
-        share = training.count / problem.count.sum()
-        values, vectors = np.linalg.eigh(training.xx / share)
-        projected = vectors.T @ (training.xy / share)
-        for k, strength in enumerate(STRENGTHS):
-            error[k] += held_out.residual_energy(vectors @ (projected / (np.maximum(values, 0.0) + strength)))
+    error = cross_validate(problem, folds, _ridge_path, choice="ridge strength")
     return STRENGTHS[int(np.argmin(error))]
+
+
+def _ridge_path(normal: NormalEquations) -> Array:
+    """Coefficients for all strengths, shape (strengths, d), by one eigendecomposition."""
+    values, vectors = seen_directions(normal.xx)
+    shrunk = values + np.array(STRENGTHS)[:, None]
+    return np.asarray(((vectors.T @ normal.xy) / shrunk) @ vectors.T)

@@ -8,6 +8,8 @@ from scipy.signal import periodogram
 from casysid.arrays import Array
 
 FLOOR_MARGIN = 4.0
+MINIMUM_CHANGES = 50
+MULTIPLES_THAT_TELL = 9.0
 
 
 def _even_samples(time: Array, position: Array) -> tuple[Array, float]:
@@ -34,12 +36,31 @@ def motion_band(time: Array, position: Array, share: float = 0.99) -> Array:
 
 
 def position_noise(time: Array, position: Array) -> Array:
-    """Standard deviation of white position noise by channel, shape (n,), in the channel's unit.
+    """Standard deviation of position noise by channel, shape (n,), in the channel's unit.
 
-    Read from the upper half of the spectrum, where no motion is: the median of an exponentially distributed periodogram is
-    ``ln 2`` times its mean.
+    White noise is read from the upper half of the spectrum, where no motion is: the median of an exponentially distributed
+    periodogram is ``ln 2`` times its mean. A quantised sensor adds at least its step over √12 (Widrow 1956), which a slow motion
+    shows at low frequencies only.
     """
     even, rate = _even_samples(time, position)
-    _, power = periodogram(even, rate, detrend="linear", axis=0)
+    _, power = periodogram(even, rate, window="hann", detrend="linear", axis=0)
     floor = np.median(power[len(power) // 2 :], axis=0) / np.log(2.0)
-    return np.sqrt(floor * rate / 2.0)
+    return np.maximum(np.sqrt(floor * rate / 2.0), position_resolution(position) / np.sqrt(12.0))
+
+
+def position_resolution(position: Array) -> Array:
+    """Quantisation step by channel, shape (n,), in the channel's unit; 0 where the values are not multiples of a step."""
+    return np.array([_step(channel) for channel in position.T])
+
+
+def _step(values: Array) -> float:
+    """The smallest change, if nearly all changes are multiples of it and many samples share it."""
+    change = np.abs(np.diff(values))
+    change = change[change > 1e-12 * max(np.abs(values).max(initial=0.0), 1e-300)]
+    if len(change) < MINIMUM_CHANGES:
+        return 0.0
+    step = float(np.quantile(change, 0.01))
+    multiples = change / step
+    regular = np.abs(multiples - np.round(multiples)) < 0.05
+    few = multiples < MULTIPLES_THAT_TELL
+    return step if few.sum() >= MINIMUM_CHANGES and regular[few].mean() > 0.95 else 0.0

@@ -1,0 +1,140 @@
+"""Which parameters can be known at all, which this recording shows, and in what combinations.
+
+Structure: the regressor at random states has a null space however rich the motion is. Columns are taken from the base to the tip;
+one that depends on those before it joins them, so that ``β = θ_independent + K θ_dependent`` are the base parameters (Gautier and
+Khalil 1990, numerical form Gautier 1991). Data: the same on the moments of a recording, where further directions may be too weak.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+
+from casysid.arrays import Array, frozen
+from casysid.dynamics import Regressor
+from casysid.moments import Moments
+from casysid.robot import Robot
+from casysid.robot.coordinates import state_from_channels
+
+RANK_TOLERANCE = 3e-5
+"""Relative singular values below this are rounding of the model's angles (four digits give 1e-6), not rank."""
+COEFFICIENT_TOLERANCE = 1e-3
+"""Weights in a combination below this fraction of its largest are left out of the words."""
+
+
+class Identifiability(enum.Enum):
+    """What can be known of one parameter; the value is the phrase a user reads."""
+
+    ALONE = "by itself"
+    COMBINED = "only in combination"
+    NOT_AT_ALL = "not at all"
+
+
+@dataclass(frozen=True, eq=False)
+class BaseParameters:
+    """The minimal set of combinations that the torque depends on.
+
+    Attributes:
+        names: Of all p parameters.
+        independent: Indices of the parameters that lead a combination, shape (r,).
+        transform: ``β = B θ``, shape (r, p): one at the leading parameter, the others' weights beside it.
+        condition_number: Of the standardised regressor of the base parameters.
+    """
+
+    names: tuple[str, ...]
+    independent: Array
+    transform: Array
+    condition_number: float
+
+    @property
+    def rank(self) -> int:
+        """Number of base parameters."""
+        return len(self.independent)
+
+    def words(self) -> tuple[str, ...]:
+        """Each combination written out, such as ``link_1.Izz + 0.09 link_2.m``."""
+        return tuple(self._combination(row) for row in range(self.rank))
+
+    def _combination(self, row: int) -> str:
+        weights = self.transform[row]
+        leading = int(self.independent[row])
+        text = self.names[leading]
+        for column in np.flatnonzero(np.abs(weights) > COEFFICIENT_TOLERANCE * np.abs(weights).max()):
+            if column != leading:
+                weight = weights[column]
+                factor = "" if np.isclose(abs(weight), 1.0, rtol=1e-6) else f"{abs(weight):.4g} "
+                text += f" {'-' if weight < 0 else '+'} {factor}{self.names[column]}"
+        return text
+
+    def identifiability(self) -> tuple[Identifiability, ...]:
+        """For each of the p parameters: by itself, only in combination, not at all."""
+        mixed = np.abs(self.transform) > COEFFICIENT_TOLERANCE * np.abs(self.transform).max(axis=1, keepdims=True)
+        alone = mixed.sum(axis=1) == 1
+        return tuple(
+            Identifiability.NOT_AT_ALL
+            if not mixed[:, column].any()
+            else Identifiability.ALONE
+            if alone[mixed[:, column]].all()
+            else Identifiability.COMBINED
+            for column in range(len(self.names))
+        )
+
+
+def base_parameters_of_gram(gram: Array, names: tuple[str, ...], tolerance: float = RANK_TOLERANCE) -> BaseParameters:
+    """Base parameters from any Gram matrix ``Σ x xᵀ`` of the regressor's rows, shape (p, p)."""
+    energy = np.diag(gram).copy()
+    live = energy > np.finfo(np.float64).eps * max(energy.max(initial=0.0), np.finfo(np.float64).tiny)
+    scale = np.where(live, 1.0 / np.sqrt(np.where(live, energy, 1.0)), 0.0)
+    values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
+    root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T  # rows whose Gram is the standardised one
+    independent = _independent_columns(root, live, tolerance)
+    weights = np.linalg.lstsq(root[:, independent], root, rcond=None)[0]
+    transform = weights / np.where(live, scale, 1.0)[independent][:, None] * scale
+    transform[:, independent] = np.eye(len(independent))
+    singular = np.linalg.svd(root[:, independent], compute_uv=False) if len(independent) else np.ones(1)
+    return BaseParameters(names, independent, frozen(transform), float(singular[0] / singular[-1]))
+
+
+def _independent_columns(root: Array, live: Array, tolerance: float) -> Array:
+    """Columns that are not combinations of those before them (Gram-Schmidt, orthogonalised twice)."""
+    basis = np.empty((root.shape[0], 0))
+    independent = []
+    for column in np.flatnonzero(live):
+        rest = root[:, column]
+        for _ in range(2):
+            rest = rest - basis @ (basis.T @ rest)
+        length = float(np.linalg.norm(rest))
+        if length > tolerance * np.sqrt(root.shape[1]):
+            independent.append(int(column))
+            basis = np.column_stack([basis, rest / length])
+    return np.array(independent, dtype=np.intp)
+
+
+def structural_base_parameters(regressor: Regressor, *, samples: int = 0, seed: int = 0) -> BaseParameters:
+    """Base parameters of the mechanism itself, from random states within its limits (Gautier 1991)."""
+    robot = regressor.robot
+    count = samples or 40 + 4 * len(regressor.names)
+    q, v, a = random_states(robot, count, np.random.default_rng(seed))
+    rows = regressor.evaluate(q, v, a).reshape(-1, len(regressor.names))
+    return base_parameters_of_gram(rows.T @ rows, regressor.names)
+
+
+def excited_base_parameters(regressor: Regressor, moments: Moments, noise_std: Array) -> BaseParameters:
+    """Base parameters that a recording shows, its joints weighted by ``1/σ²``; ``noise_std`` of shape (joints,), [N m]."""
+    return base_parameters_of_gram(moments.pooled(noise_std**-2.0).xx, regressor.names)
+
+
+def random_states(robot: Robot, count: int, rng: np.random.Generator) -> tuple[Array, Array, Array]:
+    """Random ``q, v, a`` of shapes (N, nq), (N, nv), (N, nv); positions within limits where there are any."""
+    lower = np.where(np.isfinite(robot.position_lower), robot.position_lower, -np.pi)
+    upper = np.where(np.isfinite(robot.position_upper), robot.position_upper, np.pi)
+    position = rng.uniform(lower, upper, size=(count, len(robot.channels)))
+    for joint in robot.joints:
+        if joint.channels.stop - joint.channels.start >= 4:
+            quaternion = slice(joint.channels.stop - 4, joint.channels.stop)
+            position[:, quaternion] = rng.normal(size=(count, 4))
+            position[:, quaternion] /= np.linalg.norm(position[:, quaternion], axis=1, keepdims=True)
+    q, _, _ = state_from_channels(robot, position, np.zeros_like(position), np.zeros_like(position))
+    return q, rng.normal(size=(count, robot.nv)), 3.0 * rng.normal(size=(count, robot.nv))

@@ -1,0 +1,173 @@
+"""The answer of an identification, with everything that is needed to check it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from casysid.arrays import Array, frozen
+from casysid.dynamics import Regressor
+from casysid.estimation import Estimate, Status
+from casysid.identifiability import BaseParameters
+from casysid.identification.cutoff import CutoffChoice
+from casysid.identification.links import LinkProperties, link_properties
+from casysid.identification.prediction import TorqueError
+from casysid.identification.settings import Settings
+from casysid.inertia import smallest_eigenvalue
+from casysid.robot import Robot
+from casysid.signals import Motion
+
+JOINT_KINDS = ("viscous", "coulomb", "offset", "armature")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IdentificationResult:
+    """Identified parameters of a robot and how far they can be trusted.
+
+    Attributes:
+        robot: The robot as its file describes it.
+        settings: What was asked for.
+        cutoff: The low-pass and why.
+        regressor: Of which ``parameters`` are the coefficients.
+        estimate: The unconstrained estimate.
+        parameters: The answer, shape (p,).
+        structural: Base parameters of the mechanism.
+        excited: Base parameters that the recordings show.
+        train: Torque error on the fitted recordings.
+        held_out: Torque error on recordings never fitted; None without any.
+        file: Torque error of the file's own parameters, on the held-out recordings if there are any, else on the fitted ones.
+        train_motions: The fitted motions.
+        held_out_motions: The motions never fitted.
+        seconds: Wall time of the stages by name.
+    """
+
+    robot: Robot
+    settings: Settings
+    cutoff: CutoffChoice
+    regressor: Regressor
+    estimate: Estimate
+    parameters: Array
+    structural: BaseParameters
+    excited: BaseParameters
+    train: TorqueError
+    held_out: TorqueError | None
+    file: TorqueError
+    train_motions: tuple[Motion, ...]
+    held_out_motions: tuple[Motion, ...]
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parameters", frozen(self.parameters))
+
+    @property
+    def status(self) -> Status:
+        """Why the estimator stopped."""
+        return self.estimate.status
+
+    @property
+    def inertial_parameters(self) -> Array:
+        """The links' parameters, shape (links, 10)."""
+        return self.parameters[: 10 * len(self.robot.links)].reshape(-1, 10)
+
+    @property
+    def smallest_pseudo_inertia_eigenvalue(self) -> float:
+        """Over all links; not negative exactly when some distribution of mass has these parameters."""
+        return float(smallest_eigenvalue(self.inertial_parameters).min())
+
+    @property
+    def negative_drive_parameters(self) -> tuple[str, ...]:
+        """Names of friction and armature parameters that ought not to be negative, and are."""
+        return tuple(
+            parameter.name
+            for parameter, value in zip(self.regressor.parameters, self.parameters, strict=True)
+            if parameter.non_negative and value < 0.0 and parameter.kind != "m"
+        )
+
+    @property
+    def is_physically_consistent(self) -> bool:
+        """Positive definite pseudo-inertia of every link, and no negative friction or armature."""
+        return self.smallest_pseudo_inertia_eigenvalue > 0.0 and not self.negative_drive_parameters
+
+    @property
+    def inconsistent_links(self) -> tuple[str, ...]:
+        """Links whose pseudo-inertia is not positive definite."""
+        smallest = smallest_eigenvalue(self.inertial_parameters)
+        return tuple(link for link, value in zip(self.robot.links, smallest, strict=True) if not value > 0.0)
+
+    def links(self) -> tuple[LinkProperties, ...]:
+        """Mass, centre of mass and inertia of every link with their standard errors."""
+        identifiable = self.structural.identifiability()
+        return tuple(
+            link_properties(
+                link,
+                self.parameters[10 * k : 10 * k + 10],
+                self.estimate.covariance[10 * k : 10 * k + 10, 10 * k : 10 * k + 10],
+                identifiable[10 * k : 10 * k + 10],
+            )
+            for k, link in enumerate(self.robot.links)
+        )
+
+    def drive_parameters(self) -> dict[str, dict[str, float | None]]:
+        """Friction and armature by degree of freedom; None for a kind that is not in the model. Couplings go by their name."""
+        table: dict[str, dict[str, float | None]] = {dof: dict.fromkeys(JOINT_KINDS) for dof in self.robot.dofs}
+        for parameter, value in zip(self.regressor.parameters, self.parameters, strict=True):
+            if parameter.owner not in self.robot.links or parameter.kind in JOINT_KINDS:
+                table.setdefault(parameter.owner, {})[parameter.kind] = float(value)
+        return table
+
+    def drive_vector(self, kind: str) -> Array:
+        """One kind of drive parameter by degree of freedom, shape (nv,); zero where the model has none."""
+        table = self.drive_parameters()
+        return np.array([table[dof][kind] or 0.0 for dof in self.robot.dofs])
+
+    def to_json(self) -> dict[str, object]:
+        """The result as plain numbers, lists and words; infinities and NaN as null."""
+        by_joint = self.robot.dofs
+        held_out = self.held_out
+        content: dict[str, object] = {
+            "status": self.status.value,
+            "method": self.estimate.method,
+            "robot": self.robot.name,
+            "joints": list(by_joint),
+            "samples": {"train": self.train.samples, "held_out": held_out.samples if held_out else 0},
+            "seconds": round(sum(self.seconds.values()), 3),
+            "cutoff": {"hz": self.cutoff.cutoff, "motion_band_hz": self.cutoff.motion_band, "reason": self.cutoff.reason},
+            "relative_error": {
+                "train": self.train.relative,
+                "held_out": held_out.relative if held_out else None,
+                "file": self.file.relative,
+            },
+            "relative_error_unfiltered": {
+                "train": self.train.relative_unfiltered,
+                "held_out": held_out.relative_unfiltered if held_out else None,
+                "file": self.file.relative_unfiltered,
+            },
+            "torque_rmse": {
+                "train": dict(zip(by_joint, self.train.rmse.tolist(), strict=True)),
+                "held_out": dict(zip(by_joint, held_out.rmse.tolist(), strict=True)) if held_out else None,
+            },
+            "physically_consistent": self.is_physically_consistent,
+            "smallest_pseudo_inertia_eigenvalue": self.smallest_pseudo_inertia_eigenvalue,
+            "base_parameters": {
+                "rank": self.structural.rank,
+                "condition_number": self.excited.condition_number,
+                "excited_rank": self.excited.rank,
+                "combinations": list(self.structural.words()),
+            },
+            "links": {link.name: link.to_json() for link in self.links()},
+            "friction": self.drive_parameters(),
+            "diagnostics": dict(self.estimate.diagnostics),
+        }
+        return content
+
+
+def without_infinities(value: object) -> object:
+    """The same nested content with infinities and NaN as None, which JSON can hold."""
+    if isinstance(value, dict):
+        return {key: without_infinities(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [without_infinities(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

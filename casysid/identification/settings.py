@@ -1,0 +1,43 @@
+"""Everything a run of the identification can be told; nothing of it is needed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from casysid.dynamics import DEFAULT_FRICTION, Column, Coupling
+from casysid.errors import ParameterError
+from casysid.estimation import Estimator, Ridge
+from casysid.inertia import Consistency
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Hyperparameters of one identification.
+
+    Attributes:
+        method: The estimator.
+        consistency: Physical laws that the parameters are made to obey; None leaves the estimate as it is.
+        cutoff: Low-pass cut-off [Hz]; None lets the data choose.
+        friction: Kinds of friction and drive columns of every joint.
+        couplings: Transmissions that link joints, such as a wrist driven by two motors.
+        blocks: Blocks of time by which moments are kept: the folds of cross-validation and the unit of standard errors.
+        threads: Threads of the regressor's evaluation.
+    """
+
+    method: Estimator = field(default_factory=Ridge)
+    consistency: Consistency | None = None
+    cutoff: float | None = None
+    friction: tuple[Column, ...] = DEFAULT_FRICTION
+    couplings: tuple[Coupling, ...] = ()
+    blocks: int = 20
+    threads: int = 2
+
+    def __post_init__(self) -> None:
+        if self.cutoff is not None and not (np.isfinite(self.cutoff) and self.cutoff > 0):
+            raise ParameterError(f"cut-off must be a positive number of Hz; got {self.cutoff}")
+        if self.blocks < 4:
+            raise ParameterError(f"blocks must be at least 4 for cross-validation and standard errors; got {self.blocks}")
+        if self.threads < 1:
+            raise ParameterError(f"threads must be at least 1; got {self.threads}")

@@ -1,0 +1,85 @@
+"""Moments add, shift and pool like the rows they stand for."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from casysid.errors import ParameterError
+from casysid.moments import Moments
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def draw_rows(seed: int, rows: int = 40, columns: int = 4) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=(rows, columns)), rng.normal(size=rows)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds, st.integers(1, 7), st.integers(1, 5))
+def test_moments_of_concatenated_rows_add(seed, blocks, others):
+    (x1, y1), (x2, y2) = draw_rows(seed), draw_rows(seed + 1, rows=23)
+    both = Moments.from_rows(x1, y1, blocks=blocks) + Moments.from_rows(x2, y2, blocks=others)
+    whole = Moments.from_rows(np.vstack([x1, x2]), np.append(y1, y2))
+    assert both.blocks == blocks + others
+    assert np.allclose(both.pooled().xx, whole.pooled().xx)
+    assert np.allclose(both.pooled().xy, whole.pooled().xy)
+    assert both.pooled().yy == pytest.approx(whole.pooled().yy)
+    assert both.pooled().count == whole.pooled().count
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds)
+def test_residual_energy_is_that_of_the_rows(seed):
+    x, y = draw_rows(seed)
+    theta = np.random.default_rng(seed + 7).normal(size=4)
+    moments = Moments.from_rows(x, y, blocks=3)
+    truth = [[np.sum((yb - xb @ theta) ** 2)] for xb, yb in zip(np.array_split(x, 3), np.array_split(y, 3), strict=True)]
+    assert np.allclose(moments.residual_energy(theta), truth)
+    assert moments.pooled().residual_energy(theta) == pytest.approx(np.sum(truth))
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds)
+def test_shifting_is_subtracting_a_prediction(seed):
+    x, y = draw_rows(seed)
+    theta = np.random.default_rng(seed + 7).normal(size=4)
+    shifted = Moments.from_rows(x, y, blocks=2).shifted(theta)
+    direct = Moments.from_rows(x, y - x @ theta, blocks=2)
+    assert np.allclose(shifted.gram, direct.gram)
+
+
+def test_weights_multiply_the_rows_of_their_joint():
+    x, y = draw_rows(0)
+    one = Moments.from_rows(x, y)
+    two = Moments(np.concatenate([one.gram, 4 * one.gram], axis=1), np.tile(one.count, 2), one.columns, ("a", "b"))
+    assert np.allclose(two.pooled([1.0, 0.25]).xx, 2 * one.pooled().xx)
+
+
+def test_arrays_are_copies_and_read_only():
+    gram = np.eye(3)[None, None].copy()
+    moments = Moments(gram, np.ones((1, 1)), ("a", "b"), ("j",))
+    gram[:] = 7
+    assert np.array_equal(moments.gram[0, 0], np.eye(3))
+    with pytest.raises(ValueError, match="read-only"):
+        moments.gram[0, 0, 0, 0] = 1
+
+
+@pytest.mark.parametrize(
+    ("gram", "count", "message"),
+    [
+        (np.ones((1, 1, 2, 2)), np.ones((1, 1)), r"shape \(blocks, 1, 3, 3\)"),
+        (np.ones((1, 1, 3, 3)), np.ones((2, 1)), r"count must have shape \(1, 1\)"),
+        (np.full((1, 1, 3, 3), np.nan), np.ones((1, 1)), "must be finite"),
+    ],
+)
+def test_wrong_shapes_are_named(gram, count, message):
+    with pytest.raises(ParameterError, match=message):
+        Moments(gram, count, ("a", "b"), ("j",))
+
+
+def test_only_like_moments_add():
+    x, y = draw_rows(0)
+    with pytest.raises(ParameterError, match="same columns and joints"):
+        Moments.from_rows(x, y) + Moments.from_rows(x[:, :3], y)
