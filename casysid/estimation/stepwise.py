@@ -29,7 +29,7 @@ class StepwiseRegression:
         f_to_enter: A column enters when its F statistic is the largest and above this (4: about 5 % significance).
         f_to_remove: A column leaves when its F statistic is the smallest and below this; at most ``f_to_enter``.
         tolerance: A column enters only if at least this fraction of its energy is not explained by those already in.
-        max_steps: Entries and removals at most, in multiples of the number of columns.
+        max_steps: Entries and removals at most.
     """
 
     name: ClassVar[str] = "stepwise"
@@ -37,7 +37,7 @@ class StepwiseRegression:
     f_to_enter: float = 4.0
     f_to_remove: float = 3.9
     tolerance: float = 1e-8
-    max_steps: int = 10
+    max_steps: int = 10_000
 
     def __post_init__(self) -> None:
         if not 0.0 < self.f_to_remove <= self.f_to_enter:
@@ -71,14 +71,13 @@ class StepwiseRegression:
         """The chosen columns, the number of steps, and whether no further step was due."""
         tableau = np.block([[normal.xx, normal.xy[:, None]], [normal.xy, normal.yy]])
         active = np.zeros(len(normal.xy), dtype=bool)
-        limit = self.max_steps * len(active)
-        for step in range(limit):
+        for step in range(self.max_steps):
             k = self._due(tableau, active, normal.count)
             if k is None:
                 return active, step, True
             _sweep(tableau, k, -1.0 if active[k] else 1.0)
             active[k] = not active[k]
-        return active, limit, False
+        return active, self.max_steps, False
 
     def _due(self, tableau: Array, active: npt.NDArray[np.bool_], count: float) -> int | None:
         """The column that has to leave, else the one that may enter, else None."""
