@@ -1,8 +1,8 @@
 """Logged channels to Pinocchio's state and back.
 
-A log has one angle for a continuous joint, three numbers for a planar one, and quaternions for spherical joints and free
-bases; derivatives are those of the channels. Pinocchio wants (cos, sin), body angular velocity, and the linear velocity of
-a free base in its own frame.
+A log has one angle for a continuous joint, three numbers for a planar one, quaternions for spherical joints and free
+bases; derivatives are those of the channels. Pinocchio wants (cos, sin), body angular velocity, and the linear velocity
+of a free base in its own frame.
 """
 
 from __future__ import annotations

@@ -28,4 +28,8 @@ def read_robot(
     root = parse_xml(read_bytes(path), path)
     if root.tag == "robot":
         return read_urdf(path, gravity=gravity, floating_base=floating_base, locked=locked, stacklevel=4)
+    if root.tag == "mujoco":
+        from casysid.robot.mjcf import read_mjcf
+
+        return read_mjcf(path, gravity=gravity, floating_base=floating_base, locked=locked, stacklevel=4)
     raise RobotError(f"{path}: the root element is <{root.tag}>; wanted <robot> (URDF) or <mujoco> (MJCF)")

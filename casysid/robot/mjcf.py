@@ -1,0 +1,218 @@
+"""Reads MJCF: MuJoCo compiles it, and what the compiled model says becomes a Pinocchio model."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from casysid.errors import CasysidWarning, RobotError
+from casysid.robot.assembly import assemble_robot
+from casysid.robot.checks import check_gravity, check_inertia, warn_of_faults
+from casysid.robot.locking import lock_joints, lockable_values
+from casysid.robot.mjcf_actuators import scalar_joint_of_actuator
+from casysid.robot.mjcf_tree import body_names, build_pin_model, find_free_root, joint_names
+from casysid.robot.model import Robot
+from casysid.robot.xmltext import parse_xml, read_bytes
+
+
+def read_mjcf(
+    path: Path,
+    *,
+    gravity: npt.ArrayLike | None = None,
+    floating_base: bool = False,
+    locked: Mapping[str, float] | None = None,
+    stacklevel: int = 3,
+) -> Robot:
+    """The robot in an MJCF file; see :meth:`Robot.from_file`.
+
+    Raises:
+        RobotError: The file cannot be used.
+    """
+    root = parse_xml(read_bytes(path), path)
+    if root.tag != "mujoco":
+        hint = "; this looks like URDF, use Robot.from_urdf" if root.tag == "robot" else ""
+        raise RobotError(f"{path}: the root element is <{root.tag}>, an MJCF has <mujoco>{hint}")
+    with _messages_of_mujoco(path, stacklevel + 2):
+        spec, compiled = compile_mjcf(path)
+    return _robot_of_compiled(spec, compiled, path, gravity, floating_base, locked, stacklevel)
+
+
+def _robot_of_compiled(
+    spec: Any,
+    compiled: Any,
+    path: Path,
+    gravity: npt.ArrayLike | None,
+    floating_base: bool,
+    locked: Mapping[str, float] | None,
+    stacklevel: int,
+) -> Robot:
+    joints = joint_names(compiled)
+    free_root = find_free_root(compiled, path) if floating_base else None
+    held = lockable_values(locked, joints, path)
+    _refuse_loops(compiled, {name for name, _ in held}, path)
+    full = build_pin_model(compiled, free_root=free_root)
+    model_gravity = (
+        np.zeros(3) if compiled.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY else compiled.opt.gravity
+    )
+    full.gravity.linear = check_gravity(model_gravity if gravity is None else gravity)
+    model = lock_joints(full, held, path)
+    carried = _carried_bodies(compiled, free_root, {name for name, _ in held})
+    links = [carried.get(str(name)) for name in list(model.names)[1:]]
+    faults = [
+        fault
+        for link, inertia in zip(links, list(model.inertias)[1:], strict=True)
+        if link is not None
+        for fault in check_inertia(link, float(inertia.mass), np.array(inertia.inertia))
+    ]
+    robot = assemble_robot(
+        model,
+        links,
+        name=path.stem if spec.modelname in ("", "MuJoCo Model") else spec.modelname,
+        source=path,
+        source_format="mjcf",
+        faults=faults,
+        floating_base=free_root is not None,
+        locked=held,
+    )
+    _warn_of_extras(compiled, path, stacklevel + 2)
+    warn_of_faults(path, faults, stacklevel=stacklevel + 1)
+    return robot
+
+
+def compile_mjcf(path: Path) -> tuple[Any, Any]:
+    """The ``MjSpec`` of a file and its ``MjModel``, static bodies kept apart; missing meshes and textures are forgiven.
+
+    Raises:
+        RobotError: MuJoCo refuses the file.
+    """
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        spec.compiler.fusestatic = False
+        return spec, spec.compile()
+    except ValueError as error:
+        if "file" not in str(error):
+            raise _refusal(path, error) from error
+        bare = _without_files(path, error)
+        try:
+            return bare, bare.compile()
+        except ValueError:
+            raise _refusal(path, error) from error
+
+
+def _refusal(path: Path, error: ValueError) -> RobotError:
+    reason = " ".join(str(error).split())
+    return RobotError(f"{path}: MuJoCo does not accept the file: {reason}")
+
+
+def _without_files(path: Path, error: ValueError) -> Any:
+    """The spec without geometry from files on bodies that state their inertia: it is not needed for the dynamics.
+
+    Raises:
+        RobotError: The file cannot even be parsed.
+    """
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+    except ValueError:
+        raise _refusal(path, error) from error
+    spec.compiler.fusestatic = False
+    for geom in list(spec.geoms):
+        body = geom.parent
+        needless = body.name == "world" or (body.explicitinertial and spec.compiler.inertiafromgeom != 1)
+        if needless and (geom.meshname or geom.hfieldname):
+            spec.delete(geom)
+    for asset in [*spec.skins, *spec.meshes, *spec.hfields, *spec.materials, *spec.textures]:
+        spec.delete(asset)
+    return spec
+
+
+@contextmanager
+def _messages_of_mujoco(path: Path, stacklevel: int) -> Iterator[None]:
+    """Passes on what MuJoCo's compiler warns of, with the file's name."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for message in caught:
+        warnings.warn(f"{path}: MuJoCo: {message.message}", CasysidWarning, stacklevel=stacklevel + 1)
+
+
+def _refuse_loops(compiled: Any, locked: Collection[str], path: Path) -> None:
+    """Nothing, if the mechanism is a tree whose joints move by themselves.
+
+    Raises:
+        RobotError: An active equality constraint couples bodies, joints or tendons.
+    """
+    kinds = {
+        int(mujoco.mjtEq.mjEQ_CONNECT): "connect",
+        int(mujoco.mjtEq.mjEQ_WELD): "weld",
+        int(mujoco.mjtEq.mjEQ_JOINT): "joint",
+        int(mujoco.mjtEq.mjEQ_TENDON): "tendon",
+    }
+    for k in range(compiled.neq):
+        kind = kinds.get(int(compiled.eq_type[k]))
+        if kind is None or not compiled.eq_active0[k]:
+            continue
+        ends, remedy = "", "remove it if the mechanism is a tree without it"
+        if kind == "joint":
+            names = [joint_names(compiled)[j] for j in (compiled.eq_obj1id[k], compiled.eq_obj2id[k]) if j >= 0]
+            if names[0] in locked:
+                continue
+            ends = " of " + " and ".join(f"joint '{name}'" for name in names)
+            remedy = f"lock it (locked={{'{names[0]}': 0.0}}), or {remedy}"
+        elif kind in ("connect", "weld") and compiled.eq_objtype[k] == mujoco.mjtObj.mjOBJ_BODY:
+            bodies = body_names(compiled)
+            ends = f" of bodies '{bodies[compiled.eq_obj1id[k]]}' and '{bodies[compiled.eq_obj2id[k]]}'"
+        name = f" '{compiled.equality(k).name}'" if compiled.equality(k).name else ""
+        raise RobotError(f"{path}: equality constraint <{kind}>{name}{ends}: closed loops are not supported; {remedy}")
+
+
+def _carried_bodies(compiled: Any, free_root: int | None, locked: Collection[str]) -> dict[str, str]:
+    """The body that each joint carries, by joint name: the last joint of a body that moves carries it."""
+    joints, bodies = joint_names(compiled), body_names(compiled)
+    carried: dict[str, str] = {}
+    for b in range(1, compiled.nbody):
+        first = compiled.body_jntadr[b]
+        own = [joints[j] for j in range(first, first + compiled.body_jntnum[b]) if joints[j] not in locked]
+        if own:
+            carried[own[-1]] = bodies[b]
+        elif b == free_root:
+            carried["root_joint"] = bodies[b]
+    return carried
+
+
+def _warn_of_extras(compiled: Any, path: Path, stacklevel: int) -> None:
+    """One :class:`CasysidWarning` that names forces of the file that the dynamic model does not have."""
+    joints, bodies = joint_names(compiled), body_names(compiled)
+    extras = []
+    springs = [
+        joints[j] for j in range(compiled.njnt) if compiled.jnt_stiffness[j] or compiled.jnt_stiffnesspoly[j].any()
+    ]
+    if springs:
+        extras.append(f"stiffness of joints {', '.join(springs)}")
+    curved = [joints[compiled.dof_jntid[i]] for i in range(compiled.nv) if compiled.dof_dampingpoly[i].any()]
+    if curved:
+        extras.append(f"nonlinear damping of joints {', '.join(dict.fromkeys(curved))}")
+    floating = [bodies[b] for b in range(1, compiled.nbody) if compiled.body_gravcomp[b]]
+    if floating:
+        extras.append(f"gravcomp of bodies {', '.join(floating)}")
+    if compiled.ntendon:
+        extras.append(f"tendons ({compiled.ntendon})")
+    if compiled.opt.density or compiled.opt.viscosity:
+        extras.append("the fluid around the robot")
+    for k in range(compiled.nu):
+        if scalar_joint_of_actuator(compiled, k) is None and (
+            compiled.actuator_armature[k] or compiled.actuator_damping[k]
+        ):
+            extras.append(f"armature and damping of actuator '{compiled.actuator(k).name or k}'")
+    if extras:
+        warnings.warn(
+            f"{path}: not part of the dynamic model: {'; '.join(extras)}. Their torques go into what is identified",
+            CasysidWarning,
+            stacklevel=stacklevel,
+        )
