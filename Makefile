@@ -1,0 +1,29 @@
+# make demo   set up and run the main job
+# make test   set up and pass the tests
+# make lint   style and types
+PYTHON ?= python3
+VENV   ?= .venv
+OUT    ?= out/demo
+
+.PHONY: demo test lint setup clean
+.DEFAULT_GOAL := demo
+
+setup: $(VENV)/.ready
+
+$(VENV)/.ready: pyproject.toml constraints.txt scripts/set_up.sh
+	bash scripts/set_up.sh "$(PYTHON)" "$(VENV)"
+	touch $@
+
+demo: setup
+	$(VENV)/bin/python scripts/run_demo.py --out $(OUT)
+
+test: setup
+	OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -n 2 --durations 10
+
+lint: setup
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+
+clean:
+	rm -rf $(VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,48 @@
+"""The ``casysid`` command and its verbs."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from casysid.cli.identify import identify
+from casysid.cli.info import info
+
+app = typer.Typer(
+    name="casysid",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    help="Identify robot dynamics: from a URDF or MJCF and a log of joint positions and torques to a model a controller can trust.",
+    epilog="Exit codes: 0 done, 1 a solver failed but the result was written, 2 bad input.",
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from casysid import __version__
+
+        typer.echo(f"casysid {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+app.command(
+    epilog="Examples: casysid identify arm.urdf excite.csv --split 0.6 --out identified  ·  "
+    "casysid identify arm.xml run1.csv run2.parquet --held-out run3.csv"
+)(identify)
+app.command(epilog="Examples: casysid info arm.urdf  ·  casysid info arm.urdf excite.csv.gz")(info)
+
+
+def main() -> None:
+    """Run the command line."""
+    app()

@@ -1,0 +1,74 @@
+"""How the command line speaks: progress, warnings and errors on stderr, exit codes."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table as RichTable
+
+from casysid.errors import CasysidError
+
+BAD_INPUT = 2
+SOLVER_FAILED = 1
+INTERRUPTED = 130
+
+
+@contextmanager
+def speaking() -> Iterator[Console]:
+    """A console on stderr; casysid's errors become one message and exit code 2, warnings one line each."""
+    console = Console(stderr=True)
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                yield console
+            finally:
+                _tell_warnings(console, caught)
+    except CasysidError as error:
+        console.print(f"[bold red]error:[/] {_plain(str(error))}", soft_wrap=True)
+        sys.exit(BAD_INPUT)
+    except KeyboardInterrupt:
+        console.print("interrupted; nothing further was written")
+        sys.exit(INTERRUPTED)
+
+
+@contextmanager
+def progress_bar(console: Console) -> Iterator[Callable[[str, float], None]]:
+    """A bar that names the stage at work."""
+    columns = (TextColumn("{task.description:<12}"), BarColumn(bar_width=32), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        tasks: dict[str, int] = {}
+
+        def tell(stage: str, share: float) -> None:
+            if stage not in tasks:
+                for task in tasks.values():
+                    bar.update(task, completed=1.0)  # type: ignore[arg-type]
+                tasks[stage] = bar.add_task(stage, total=1.0)
+            bar.update(tasks[stage], completed=share)  # type: ignore[arg-type]
+
+        yield tell
+
+
+def rich_table(title: str, header: tuple[str, ...], rows: tuple[tuple[str, ...], ...]) -> RichTable:
+    """A table for the terminal: first column to the left, numbers to the right."""
+    table = RichTable(title=title, title_justify="left", title_style="bold", header_style="dim", box=None, pad_edge=False)
+    for k, name in enumerate(header):
+        table.add_column(_plain(name), justify="left" if k == 0 else "right")
+    for row in rows:
+        table.add_row(*(_plain(cell) for cell in row))
+    return table
+
+
+def _tell_warnings(console: Console, caught: list[warnings.WarningMessage]) -> None:
+    for text in dict.fromkeys(str(one.message) for one in caught):
+        console.print(f"[yellow]warning:[/] {_plain(text)}", soft_wrap=True)
+
+
+def _plain(text: str) -> str:
+    """Text in which rich sees no markup."""
+    return text.replace("[", r"\[")

@@ -1,0 +1,38 @@
+"""``casysid info``: what a robot and a recording hold, before anything is computed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from casysid.cli.options import FloatingOption, GravityOption, LockOption, RobotArgument, load_robot
+
+
+def info(
+    robot: RobotArgument,
+    log: Annotated[Path | None, typer.Argument(metavar="[LOG]", help="A recording to look into.")] = None,
+    gravity: GravityOption = None,
+    lock: LockOption = None,
+    floating_base: FloatingOption = False,
+) -> None:
+    """Show what ROBOT and LOG hold: joints, limits, masses, base parameters; rate, ranges, gaps, noise."""
+    from casysid.cli.console import speaking
+
+    with speaking():
+        from rich.console import Console
+
+        from casysid.cli.console import rich_table
+        from casysid.recording import read_recording
+        from casysid.report.overview import recording_tables, robot_tables
+
+        model = load_robot(robot, gravity, lock, floating_base)
+        console = Console()
+        console.print(f"[bold]{model.name}[/]  {model.source}", highlight=False)
+        tables = robot_tables(model)
+        if log is not None:
+            tables += recording_tables(model, read_recording(log, model))
+        for title, table in tables:
+            console.print(rich_table(title, table.header, table.rows))
+            console.print()

@@ -1,0 +1,57 @@
+"""A result on disk: ``result.json`` and the identified model, each whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+from casysid.identification.result import IdentificationResult, without_infinities
+from casysid.identification.verdict import judge
+from casysid.robot import write_robot
+
+
+def write_result(result: IdentificationResult, directory: Path, *, export_inconsistent: bool = False) -> tuple[str, ...]:
+    """Write ``result.json`` and ``identified.urdf`` or ``identified.xml`` into a directory, made if needed.
+
+    Returns:
+        What a person should know about the written model, one sentence each.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    notes = _write_model(result, directory, export_inconsistent)
+    verdict = judge(result)
+    content = {
+        **result.to_json(),
+        "verdict": {"accepted": verdict.accepted, "reasons": list(verdict.reasons), "remarks": list(verdict.remarks)},
+        "model_notes": list(notes),
+    }
+    write_json(content, directory / "result.json")
+    return notes
+
+
+def write_json(content: object, path: Path) -> None:
+    """Indented JSON through a temporary name; infinities and NaN become null."""
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_text(json.dumps(without_infinities(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    os.replace(temporary, path)
+
+
+def model_path(result: IdentificationResult, directory: Path) -> Path:
+    """Where the identified model is written: the format that came in."""
+    return directory / ("identified.urdf" if result.robot.source_format == "urdf" else "identified.xml")
+
+
+def _write_model(result: IdentificationResult, directory: Path, export_inconsistent: bool) -> tuple[str, ...]:
+    path = model_path(result, directory)
+    if not (result.is_physically_consistent or export_inconsistent):
+        path.unlink(missing_ok=True)
+        return (f"{path.name} is withheld because the parameters are not physically consistent.",)
+    written = write_robot(
+        result.robot,
+        path,
+        result.inertial_parameters.ravel(),
+        damping=result.drive_vector("viscous"),
+        dry_friction=result.drive_vector("coulomb"),
+        armature=result.drive_vector("armature"),
+    )
+    return written.notes

@@ -1,0 +1,88 @@
+"""The report that an engineer hands to a colleague: one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from casysid.identification import IdentificationResult
+from casysid.identification.verdict import judge
+from casysid.report.pictures import cutoff_figure, inline_png, torque_figure
+from casysid.report.tables import Table, drive_table, error_table, link_table
+
+
+@dataclass(frozen=True)
+class Section:
+    """One heading of the report with what stands under it."""
+
+    title: str
+    text: str = ""
+    picture: str = ""
+    table: Table | None = None
+    lines_title: str = ""
+    lines: tuple[str, ...] = ()
+
+
+def write_report(result: IdentificationResult, path: Path) -> None:
+    """Write ``report.html``, whole or not at all."""
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_text(render_report(result), encoding="utf-8")
+    os.replace(temporary, path)
+
+
+def render_report(result: IdentificationResult) -> str:
+    """The report as HTML text."""
+    from jinja2 import Environment
+
+    from casysid import __version__
+
+    template = resources.files("casysid.report").joinpath("template.html").read_text(encoding="utf-8")
+    return (
+        Environment(autoescape=True)
+        .from_string(template)
+        .render(
+            robot=result.robot.name,
+            facts=_facts(result),
+            verdict=judge(result),
+            sections=_sections(result),
+            footer=f"casysid {__version__}, {sum(result.seconds.values()):.1f} s",
+        )
+    )
+
+
+def _facts(result: IdentificationResult) -> list[str]:
+    held_out = result.held_out.samples if result.held_out else 0
+    cutoff = "no low-pass" if result.cutoff.cutoff is None else f"low-pass {result.cutoff.cutoff:.3g} Hz"
+    return [
+        f"{len(result.robot.dofs)} degrees of freedom",
+        f"method {result.estimate.method}",
+        f"{result.train.samples} samples fitted, {held_out} held out",
+        cutoff,
+        f"{result.structural.rank} base parameters, condition number {result.excited.condition_number:.0f}",
+    ]
+
+
+def _sections(result: IdentificationResult) -> list[Section]:
+    shown = "held-out" if result.held_out else "fitted"
+    sections = [
+        Section(
+            "Torque error",
+            "‖measured − predicted‖ / ‖measured‖. Torque is seen through the same low-pass as the motion; the second line is "
+            "against the torque as logged.",
+            table=error_table(result),
+        ),
+        Section(f"Torque on {shown} data", picture=inline_png(torque_figure(result))),
+        Section("Friction and drive", "SI units at the joint.", table=drive_table(result)),
+        Section(
+            "Links",
+            "In the joint's frame. ∞: the data cannot tell this number by itself, it follows the model file.",
+            table=link_table(result),
+            lines_title=f"The {result.structural.rank} combinations that the torque depends on",
+            lines=result.structural.words(),
+        ),
+    ]
+    if len(result.cutoff.candidates):
+        sections.append(Section("Choice of the low-pass", result.cutoff.reason, picture=inline_png(cutoff_figure(result))))
+    return sections

@@ -1,0 +1,87 @@
+"""Pictures of an identification: measured and predicted torque, the choice of the cut-off."""
+
+from __future__ import annotations
+
+import base64
+import io
+from typing import Any
+
+import numpy as np
+
+from casysid.arrays import Array
+from casysid.identification import IdentificationResult
+from casysid.signals import Motion
+
+MEASURED, PREDICTED, RESIDUAL = "#9aa5b1", "#1f6feb", "#d1495b"
+MOST_POINTS = 3000
+
+
+def figure(width: float, height: float, rows: int = 1) -> tuple[Any, Any]:
+    """A figure of its own, outside pyplot's global state, with ``rows`` axes above each other."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    canvas = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(canvas)
+    axes = canvas.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
+    for ax in axes:
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.grid(color="#e5e8eb", linewidth=0.6)
+        ax.set_axisbelow(True)
+    return canvas, axes
+
+
+def torque_figure(result: IdentificationResult) -> Any:
+    """Measured and predicted torque of each joint over the first held-out motion, or the first fitted one."""
+    error = result.held_out or result.train
+    motion: Motion = (result.held_out_motions or result.train_motions)[0]
+    predicted = error.predictions[0]
+    pick = slice(None, None, max(1, len(motion) // MOST_POINTS))
+    canvas, axes = figure(9.5, 1.0 + 1.35 * len(result.robot.dofs), len(result.robot.dofs))
+    for k, (ax, dof) in enumerate(zip(axes, result.robot.dofs, strict=True)):
+        ax.plot(motion.time[pick], motion.tau[pick, k], color=MEASURED, linewidth=2.4, label="measured, low-passed")
+        ax.plot(motion.time[pick], predicted[pick, k], color=PREDICTED, linewidth=1.0, label="predicted")
+        ax.plot(motion.time[pick], (motion.tau - predicted)[pick, k], color=RESIDUAL, linewidth=0.7, label="difference")
+        _limit(ax, motion.tau[:, k], predicted[:, k])
+        ax.set_ylabel(f"{dof}\n{torque_unit(result, k)}", fontsize=8)
+    axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=3, frameon=False, fontsize=8)
+    axes[-1].set_xlabel("time [s]")
+    return canvas
+
+
+def torque_unit(result: IdentificationResult, dof: int) -> str:
+    """Unit of a degree of freedom's torque: that of its offset column."""
+    name = result.robot.dofs[dof]
+    units = [one.unit for one in result.regressor.parameters if (one.owner, one.kind) in ((name, "offset"), (name, "coulomb"))]
+    return units[0] if units else "N m"
+
+
+def cutoff_figure(result: IdentificationResult) -> Any:
+    """Cross-validated torque error over the cut-offs that were tried."""
+    choice = result.cutoff
+    canvas, (ax,) = figure(6.0, 2.6)
+    ax.semilogx(choice.candidates, 100.0 * choice.error, "o-", color=PREDICTED, markersize=4)
+    ax.axvline(choice.cutoff, color=RESIDUAL, linewidth=1.0)
+    ax.axvspan(0.5 * max(choice.motion_band, 1e-3), choice.motion_band, color="#e5e8eb", zorder=0)
+    ax.set_xticks(choice.candidates[::2], [f"{value:.3g}" for value in choice.candidates[::2]])
+    ax.minorticks_off()
+    ax.set_ylim(0, 1.1 * 100.0 * float(np.quantile(choice.error, 0.9)))
+    ax.set_xlabel("low-pass cut-off [Hz]  (shaded: up to the motion's band)")
+    ax.set_ylabel("cross-validated\ntorque error [%]")
+    return canvas
+
+
+def inline_png(canvas: Any) -> str:
+    """A figure as the text of a data URI."""
+    buffer = io.BytesIO()
+    canvas.savefig(buffer, format="png", dpi=110)
+    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+
+
+def _limit(ax: Any, measured: Array, predicted: Array) -> None:
+    """Axis limits by what was measured, so that a wild prediction cannot hide it."""
+    low, high = float(measured.min()), float(measured.max())
+    low, high = min(low, 0.0), max(high, 0.0)
+    room = 0.15 * max(high - low, 1e-9)
+    inside = np.clip(predicted, low - 3 * room, high + 3 * room)
+    ax.set_ylim(min(low, float(inside.min())) - room, max(high, float(inside.max())) + room)

@@ -1,0 +1,80 @@
+"""The tables that the screen and the HTML report share."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from casysid.identification import IdentificationResult
+from casysid.identification.result import JOINT_KINDS
+
+
+@dataclass(frozen=True)
+class Table:
+    """A heading and rows of text.
+
+    Attributes:
+        header: Column titles.
+        rows: Cells, as many as titles.
+    """
+
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A number as people write it; a dash for what is not there or not known."""
+    if value is None or math.isnan(value):
+        return "–"
+    return "∞" if math.isinf(value) else f"{value:.{digits}g}"
+
+
+def percent(value: float | None) -> str:
+    """A share in per cent."""
+    return "–" if value is None else f"{100.0 * value:.2f} %" if value < 10 else f"{value:.3g} ×"
+
+
+def error_table(result: IdentificationResult) -> Table:
+    """Relative torque error overall and by joint: fitted, held out, and of the file's own parameters."""
+    held_out, train, file = result.held_out, result.train, result.file
+    rows = [
+        ("all joints", percent(train.relative), percent(held_out.relative if held_out else None), percent(file.relative), ""),
+        (
+            "… unfiltered torque",
+            percent(train.relative_unfiltered),
+            percent(held_out.relative_unfiltered if held_out else None),
+            percent(file.relative_unfiltered),
+            "",
+        ),
+    ]
+    rows += [
+        (
+            dof,
+            percent(float(train.relative_by_joint[k])),
+            percent(float(held_out.relative_by_joint[k]) if held_out else None),
+            percent(float(file.relative_by_joint[k])),
+            number(float((held_out or train).rmse[k]), 3),
+        )
+        for k, dof in enumerate(result.robot.dofs)
+    ]
+    return Table(("joint", "fitted", "held out", "model file", "RMS error [N m]"), tuple(rows))
+
+
+def link_table(result: IdentificationResult) -> Table:
+    """Mass and centre of mass with standard errors, principal figures of the inertia, and what can be known."""
+    rows = []
+    for link in result.links():
+        centre = ", ".join(number(float(value), 3) for value in link.center_of_mass)
+        diagonal = ", ".join(number(float(value), 3) for value in link.inertia[:3])
+        rows.append((link.name, number(link.mass), number(link.mass_std, 2), centre, diagonal, link.identifiable[0].value))
+    header = ("link", "mass [kg]", "± std", "centre of mass [m]", "Ixx, Iyy, Izz at it [kg m²]", "mass identifiable")
+    return Table(header, tuple(rows))
+
+
+def drive_table(result: IdentificationResult) -> Table:
+    """Friction, offset and armature by joint and coupling."""
+    table = result.drive_parameters()
+    kinds = [kind for kind in JOINT_KINDS if any(row.get(kind) is not None for row in table.values())]
+    kinds += sorted({kind for row in table.values() for kind in row} - set(JOINT_KINDS))
+    rows = tuple((owner, *(number(row.get(kind)) for kind in kinds)) for owner, row in table.items())
+    return Table(("joint", *kinds), rows)
