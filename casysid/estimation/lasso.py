@@ -22,7 +22,7 @@ from casysid.moments import Moments, NormalEquations
 
 
 @dataclass(frozen=True, kw_only=True)
-class Lasso:
+class LassoRegression:
     r"""Minimises :math:`\tfrac12 β^T S β - s^T β + λ \|β\|_1` in standardised columns, relative to the prior.
 
     Attributes:

@@ -22,7 +22,7 @@ from casysid.moments import Moments, NormalEquations
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stepwise:
+class StepwiseRegression:
     """Forward selection with backward elimination on partial F tests.
 
     Attributes:

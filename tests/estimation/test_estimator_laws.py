@@ -7,18 +7,18 @@ from hypothesis import strategies as st
 
 from casysid.errors import ParameterError
 from casysid.estimation.base import Estimator, Status
-from casysid.estimation.lasso import Lasso
+from casysid.estimation.lasso import LassoRegression
 from casysid.estimation.partial_least_squares import PartialLeastSquares
 from casysid.estimation.relevance import RelevanceRegression
-from casysid.estimation.stepwise import Stepwise
+from casysid.estimation.stepwise import StepwiseRegression
 from casysid.estimation.total_least_squares import TotalLeastSquares
 from casysid.moments import Moments
 
 LAW = settings(max_examples=15, deadline=None)
 ESTIMATORS: list[Estimator] = [
-    Stepwise(),
-    Lasso(tolerance=1e-13, strengths=12, smallest_strength=1e-2),
-    Lasso(strength=0.1, tolerance=1e-13),
+    StepwiseRegression(),
+    LassoRegression(tolerance=1e-13, strengths=12, smallest_strength=1e-2),
+    LassoRegression(strength=0.1, tolerance=1e-13),
     PartialLeastSquares(),
     PartialLeastSquares(components=2),
     RelevanceRegression(tolerance=1e-9),
@@ -136,7 +136,7 @@ def test_moments_that_say_nothing_return_the_prior(estimator: Estimator) -> None
     assert estimate.method == estimator.name
 
 
-@pytest.mark.parametrize("estimator", [Lasso(), PartialLeastSquares()], ids=lambda e: e.name)
+@pytest.mark.parametrize("estimator", [LassoRegression(), PartialLeastSquares()], ids=lambda e: e.name)
 def test_a_single_block_cannot_choose_a_strength(estimator: Estimator) -> None:
     rng = np.random.default_rng(0)
     with pytest.raises(ParameterError, match="at least 2 blocks of time; got 1"):
@@ -146,10 +146,10 @@ def test_a_single_block_cannot_choose_a_strength(estimator: Estimator) -> None:
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: Stepwise(f_to_enter=2.0, f_to_remove=3.0), "enter and leave for ever"),
-        (lambda: Stepwise(tolerance=0.0), "tolerance in"),
-        (lambda: Lasso(strength=2.0), r"must lie in \[0, 1\]"),
-        (lambda: Lasso(folds=1), "2 folds"),
+        (lambda: StepwiseRegression(f_to_enter=2.0, f_to_remove=3.0), "enter and leave for ever"),
+        (lambda: StepwiseRegression(tolerance=0.0), "tolerance in"),
+        (lambda: LassoRegression(strength=2.0), r"must lie in \[0, 1\]"),
+        (lambda: LassoRegression(folds=1), "2 folds"),
         (lambda: PartialLeastSquares(components=0), "components >= 1"),
         (lambda: RelevanceRegression(tolerance=-1.0), "tolerance > 0"),
         (lambda: TotalLeastSquares(noise_covariance=np.ones(3)), "got shape"),

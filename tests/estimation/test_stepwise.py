@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from casysid.estimation.base import Status
-from casysid.estimation.stepwise import Stepwise, _sweep
+from casysid.estimation.stepwise import StepwiseRegression, _sweep
 from casysid.moments import Moments
 
 LAW = settings(max_examples=25, deadline=None)
@@ -44,7 +44,7 @@ def stepwise_by_refitting(x: np.ndarray, y: np.ndarray, to_enter: float, to_remo
 def test_sweeping_chooses_what_refitting_every_model_chooses(seed: int, thresholds: tuple[float, float]) -> None:
     x, y = draw_rows(seed)
     to_enter, to_remove = thresholds
-    estimate = Stepwise(f_to_enter=to_enter, f_to_remove=to_remove).estimate(Moments.from_rows(x, y))
+    estimate = StepwiseRegression(f_to_enter=to_enter, f_to_remove=to_remove).estimate(Moments.from_rows(x, y))
     chosen = stepwise_by_refitting(x, y, to_enter, to_remove)
     assert set(np.flatnonzero(estimate.parameters).tolist()) == chosen
     columns = sorted(chosen)
@@ -56,7 +56,7 @@ def test_sweeping_chooses_what_refitting_every_model_chooses(seed: int, threshol
 @given(seeds)
 def test_standard_errors_of_chosen_columns_are_those_of_the_small_regression(seed: int) -> None:
     x, y = draw_rows(seed)
-    estimate = Stepwise().estimate(Moments.from_rows(x, y))
+    estimate = StepwiseRegression().estimate(Moments.from_rows(x, y))
     chosen = np.flatnonzero(estimate.parameters)
     variance = residual_energy(x, y, set(chosen.tolist())) / (len(y) - len(chosen))
     expected = variance * np.linalg.inv(x[:, chosen].T @ x[:, chosen])
@@ -68,7 +68,7 @@ def test_standard_errors_of_chosen_columns_are_those_of_the_small_regression(see
 @given(seeds)
 def test_a_column_that_was_left_out_keeps_the_doubt_it_would_have_inside(seed: int) -> None:
     x, y = draw_rows(seed)
-    estimate = Stepwise().estimate(Moments.from_rows(x, y))
+    estimate = StepwiseRegression().estimate(Moments.from_rows(x, y))
     chosen = np.flatnonzero(estimate.parameters)
     variance = residual_energy(x, y, set(chosen.tolist())) / (len(y) - len(chosen))
     for k in np.flatnonzero(estimate.parameters == 0.0):
@@ -91,13 +91,13 @@ def test_sweeping_in_and_out_restores_the_tableau(seed: int) -> None:
 
 def test_running_out_of_steps_is_said_so() -> None:
     x, y = draw_rows(3)
-    estimate = Stepwise(f_to_enter=1e-9, f_to_remove=1e-9, max_steps=2).estimate(Moments.from_rows(x, y))
+    estimate = StepwiseRegression(f_to_enter=1e-9, f_to_remove=1e-9, max_steps=2).estimate(Moments.from_rows(x, y))
     assert estimate.status is Status.MAX_ITERATIONS
     assert estimate.diagnostics["selected"] == 2.0
 
 
 def test_more_columns_than_rows_still_gives_a_finite_answer() -> None:
     x, y = draw_rows(0, n=5, p=8)
-    estimate = Stepwise(f_to_enter=1e-3, f_to_remove=1e-3).estimate(Moments.from_rows(x, y))
+    estimate = StepwiseRegression(f_to_enter=1e-3, f_to_remove=1e-3).estimate(Moments.from_rows(x, y))
     assert np.isfinite(estimate.parameters).all()
     assert estimate.rank == 5
