@@ -41,7 +41,7 @@ class LassoRegression:
     strengths: int = 50
     smallest_strength: float = 1e-4
     folds: int = 5
-    tolerance: float = 1e-6
+    tolerance: float = 1e-5
     max_iterations: int = 20_000
 
     def __post_init__(self) -> None:

@@ -34,8 +34,8 @@ class RelevanceRegression:
     name: ClassVar[str] = "ard"
 
     largest_precision: float = 1e6
-    tolerance: float = 1e-6
-    max_iterations: int = 2000
+    tolerance: float = 1e-5
+    max_iterations: int = 5000
 
     def __post_init__(self) -> None:
         if min(self.largest_precision, self.tolerance) <= 0.0 or self.max_iterations < 1:

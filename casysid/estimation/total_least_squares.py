@@ -7,13 +7,14 @@ covariance it takes the noise of all standardised columns and of the target to b
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from casysid.arrays import Array, frozen
-from casysid.errors import ParameterError
+from casysid.errors import CasysidWarning, ParameterError
 from casysid.estimation.base import Estimate
 from casysid.estimation.selection import mean_variance
 from casysid.estimation.standardise import StandardisedProblem, seen_directions, standardise
@@ -49,6 +50,9 @@ class TotalLeastSquares:
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """The maximum likelihood fit in the directions that the data see, and Fuller's asymptotic covariance.
 
+        Without a noise covariance it warns (:class:`CasysidWarning`) when the fit leaves more than the whole target
+        unexplained: directions that the data hardly see then passed for noise that all columns share.
+
         Raises:
             ParameterError: The noise covariance does not fit the moments' columns and joints.
         """
@@ -57,6 +61,8 @@ class TotalLeastSquares:
             return problem.degenerate_estimate(self.name)
         noise = self._standardised_noise(moments, problem)
         fit = solve_total_least_squares(problem.normal, noise)
+        if self.noise_covariance is None:
+            _warn_if_useless(moments, problem, fit)
         variance = mean_variance(problem, fit.coefficients, fit.rank)
         return problem.to_estimate(
             self.name, fit.coefficients, fit.covariance(variance), diagnostics={"noise_factor": fit.factor}
@@ -82,6 +88,18 @@ class TotalLeastSquares:
         to_problem[problem.live, np.arange(len(problem.live))] = problem.scale / problem.target_rms
         to_problem[:, -1] = np.append(-problem.prior, 1.0) / problem.target_rms
         return np.asarray(to_problem.T @ pooled @ to_problem)
+
+
+def _warn_if_useless(moments: Moments, problem: StandardisedProblem, fit: TotalFit) -> None:
+    target = moments.pooled(problem.noise_std**-2.0)
+    energy = problem.normal.residual_energy(fit.coefficients) * problem.target_rms**2 * target.count
+    if energy > target.yy:
+        warnings.warn(
+            f"tls: residuals are {np.sqrt(energy / target.yy):.3g} times the target itself: noise of the same fraction "
+            "in every column does not fit these data. Do not use these parameters; give noise_covariance",
+            CasysidWarning,
+            stacklevel=3,
+        )
 
 
 @dataclass(frozen=True, eq=False)

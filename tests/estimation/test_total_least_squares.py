@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from casysid.errors import ParameterError
+from casysid.errors import CasysidWarning, ParameterError
 from casysid.estimation.total_least_squares import TotalLeastSquares
 from casysid.moments import Moments
 
@@ -23,6 +23,7 @@ def draw_rows(rng: np.random.Generator, noise: np.ndarray, n: int = 300) -> tupl
     return rows[:, :-1], rows[:, -1]
 
 
+@pytest.mark.filterwarnings("ignore:tls")
 @LAW
 @given(seeds)
 def test_it_is_the_smallest_singular_vector_of_standardised_rows(seed: int) -> None:
@@ -106,6 +107,14 @@ def test_a_singular_problem_is_solved_where_the_data_see_something() -> None:
     estimate = TotalLeastSquares().estimate(Moments.from_rows(twice, y), np.zeros(5))
     assert np.isinf(estimate.std).tolist() == [True, False, False, False, True]
     assert estimate.parameters[0] == pytest.approx(estimate.parameters[4])  # as far from the prior as each other
+
+
+def test_a_fit_that_is_worse_than_none_is_warned_of() -> None:
+    rng = np.random.default_rng(4)
+    x, y = rng.standard_normal((50, 2)), rng.standard_normal(50)
+    x[:, 1] = x[:, 0] + 0.01 * x[:, 1]
+    with pytest.warns(CasysidWarning, match="times the target itself"):
+        TotalLeastSquares().estimate(Moments.from_rows(x, y))
 
 
 def test_a_noise_covariance_of_the_wrong_size_is_refused() -> None:
