@@ -2,5 +2,6 @@
 
 from casysid.robot.checks import FaultKind, InertiaFault
 from casysid.robot.model import Joint, JointKind, Robot
+from casysid.robot.writing import WrittenModel, write_robot
 
-__all__ = ["FaultKind", "InertiaFault", "Joint", "JointKind", "Robot"]
+__all__ = ["FaultKind", "InertiaFault", "Joint", "JointKind", "Robot", "WrittenModel", "write_robot"]

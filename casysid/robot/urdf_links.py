@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 
 from casysid.arrays import Array, frozen
 from casysid.errors import RobotError
@@ -42,6 +43,11 @@ class UrdfLink:
     rpy: Array
     inertia: Array
     faults: tuple[InertiaFault, ...]
+
+    def central_inertia(self) -> Array:
+        """Inertia about the centre of mass, along the axes of the link frame, shape (3, 3), [kg m²]."""
+        R = pin.rpy.rpyToMatrix(*map(float, self.rpy))
+        return np.asarray(R @ full_inertia(self.inertia) @ R.T)
 
 
 def read_number(text: str) -> float:

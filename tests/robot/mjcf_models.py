@@ -6,7 +6,9 @@ FULL = '<inertial pos="0 .1 .02" mass=".8" fullinertia=".02 .03 .025 .001 .002 .
 
 
 def model(bodies: str, before: str = "", after: str = "") -> str:
-    return f'<mujoco model="case"><!-- kept -->{before}<worldbody><light pos="0 0 3"/>{bodies}</worldbody>{after}</mujoco>'
+    return (
+        f'<mujoco model="case"><!-- kept -->{before}<worldbody><light pos="0 0 3"/>{bodies}</worldbody>{after}</mujoco>'
+    )
 
 
 CASES = {
@@ -31,7 +33,9 @@ CASES = {
         f'<body name="table">{INERTIAL}</body>'
     ),
     "frames and defaults": model(
-        '<frame euler="20 0 0" pos=".1 0 0"><body name="a" childclass="soft"><joint name="j1"/>' + INERTIAL + '<frame pos="0 0 1">'
+        '<frame euler="20 0 0" pos=".1 0 0"><body name="a" childclass="soft"><joint name="j1"/>'
+        + INERTIAL
+        + '<frame pos="0 0 1">'
         f'<body name="b" pos="0 0 1" xyaxes="0 1 0 0 0 1"><joint name="j2" class="stiff"/>{TURNED}</body></frame></body></frame>',
         before='<default><joint damping=".1" armature=".01"/><default class="soft"><joint damping=".7" axis="0 1 0"/>'
         '<default class="stiff"><joint frictionloss=".4" armature=".02"/></default></default></default>',
