@@ -1,0 +1,72 @@
+"""A log file as a table: its column names at once, its numbers when asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+from casysid.arrays import Array
+from casysid.errors import RecordingError
+
+TEXT_SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".txt", ".txt.gz")
+PARQUET_SUFFIXES = (".parquet", ".pq")
+SUFFIXES = (*TEXT_SUFFIXES, *PARQUET_SUFFIXES, ".npz")
+
+
+class Table(Protocol):
+    """What every format offers."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Column names in the file's order."""
+        ...
+
+    def read(self, names: Sequence[str]) -> dict[str, Array]:
+        """The columns as float64, missing cells as nan, all of one length.
+
+        Raises:
+            RecordingError: If they cannot be read as numbers.
+        """
+        ...
+
+    def place(self, row: int) -> str:
+        """Where the row (counted from 0) stands in the file, as a person would look for it."""
+        ...
+
+
+def suffix_of(path: Path) -> str:
+    """The suffix in lower case, with the one before ``.gz``."""
+    name = path.name.lower()
+    inner, _, last = name.rpartition(".")
+    return f"{Path(inner).suffix}.gz" if last == "gz" else Path(name).suffix
+
+
+def open_table(path: Path) -> Table:
+    """The table in a file, by its suffix.
+
+    Raises:
+        RecordingError: If there is no such file, or no table in it.
+    """
+    from casysid.readers.npz import open_npz
+    from casysid.readers.parquet import open_parquet
+    from casysid.readers.text import open_text
+
+    if not path.exists():
+        raise RecordingError(f"{path}: no such file; looked from {Path.cwd()}")
+    if path.is_dir():
+        raise RecordingError(f"{path}: is a directory; name the log files in it")
+    if path.stat().st_size == 0:
+        raise RecordingError(f"{path}: the file is empty; record again or name another log")
+    openers = (
+        dict.fromkeys(TEXT_SUFFIXES, open_text) | dict.fromkeys(PARQUET_SUFFIXES, open_parquet) | {".npz": open_npz}
+    )
+    suffix = suffix_of(path)
+    if suffix in openers:
+        try:
+            return openers[suffix](path)
+        except PermissionError as error:
+            raise RecordingError(f"{path}: may not be read; change its permissions") from error
+    raise RecordingError(
+        f"{path}: '{suffix or path.name}' is no known kind of log; convert it to one of {', '.join(SUFFIXES)}"
+    )

@@ -1,0 +1,169 @@
+"""Delimited text, plain or gzipped: the header by hand, the numbers in bulk by Arrow, faults by a slow look."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import re
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from casysid.arrays import Array
+from casysid.errors import RecordingError
+
+LONGEST_LINE = 1 << 20
+NOT_TEXT = "is not text, though its suffix says so; is it a binary log, or another encoding than UTF-8?"
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """Delimited text with one header line, and comment lines starting with # before it.
+
+    Attributes:
+        path: The file.
+        names: Cells of the header.
+        header_line: Line of the header, counted from 1.
+        delimiter: Comma, semicolon, tab or space.
+        decimal: Decimal point or comma.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    header_line: int
+    delimiter: str
+    decimal: str
+
+    def read(self, names: Sequence[str]) -> dict[str, Array]:
+        """The named columns; see :class:`~casysid.readers.table.Table`."""
+        import pyarrow as pa
+        from pyarrow import csv as pa_csv
+
+        chosen = {name: str(self.names.index(name)) for name in names}
+        try:
+            with pa.input_stream(str(self.path), compression="gzip" if is_gzip(self.path) else None) as stream:
+                table = pa_csv.read_csv(
+                    stream,
+                    pa_csv.ReadOptions(
+                        skip_rows=self.header_line, column_names=[str(i) for i in range(len(self.names))]
+                    ),
+                    pa_csv.ParseOptions(delimiter=self.delimiter),
+                    pa_csv.ConvertOptions(
+                        include_columns=list(chosen.values()),
+                        column_types=dict.fromkeys(chosen.values(), pa.float64()),
+                        decimal_point=self.decimal,
+                    ),
+                )
+        except (pa.ArrowInvalid, OSError) as error:
+            raise RecordingError(f"{self.path}: {self._fault(names) or error}") from error
+        return {name: np.asarray(table.column(column).to_numpy()) for name, column in chosen.items()}
+
+    def place(self, row: int) -> str:
+        """Line of the file, counted from 1 as an editor does, comments and blank lines included."""
+        with open_lines(self.path) as lines:
+            line, _ = next(islice(self._rows(lines), row, None))
+        return f"line {line} (the header is line {self.header_line})"
+
+    def _rows(self, lines: TextIO) -> Iterator[tuple[int, list[str]]]:
+        """Line number and cells of every row that is not blank."""
+        for _ in range(self.header_line):
+            lines.readline()
+        rows = csv.reader(lines, delimiter=self.delimiter)
+        yield from ((self.header_line + rows.line_num, cells) for cells in rows if cells)
+
+    def _fault(self, names: Sequence[str]) -> str | None:
+        """What is wrong with the first row that Arrow cannot have liked; None when every row looks right."""
+        columns = [(name, self.names.index(name)) for name in names]
+        wanted = f"where the header (line {self.header_line}) names {len(self.names)}"
+        with open_lines(self.path) as lines:
+            rows = self._rows(lines)
+            for line, cells in rows:
+                if len(cells) != len(self.names):
+                    last = next(rows, None) is None and len(cells) < len(self.names)
+                    advice = (
+                        "writing was cut off: delete the line"
+                        if last
+                        else "mend the line; rows are not dropped silently"
+                    )
+                    return f"line {line} has {len(cells)} cells {wanted}: '{self.delimiter.join(cells)[:60]}'; {advice}"
+                for name, k in columns:
+                    if not is_number(cells[k].replace(self.decimal, ".")):
+                        return f"column '{name}' holds '{cells[k][:40]}' in line {line}: no number; mend the line"
+        return None
+
+
+def open_text(path: Path) -> TextTable:
+    """The header of a delimited text file; without one, the comment line before the numbers if it has as many cells.
+
+    Raises:
+        RecordingError: If the file is not text, is cut off, or has no header.
+    """
+    comment, header, number = "", "", 0
+    with open_lines(path) as lines:
+        while not header:
+            line = lines.readline(LONGEST_LINE)
+            if not line:
+                raise RecordingError(
+                    f"{path}: no header line, only blank lines and comments; wanted names such as time,q1,tau1"
+                )
+            number += 1
+            comment, header = (line, "") if line.startswith("#") else (comment, line.strip("\r\n "))
+        first = lines.readline(LONGEST_LINE)
+    if "\0" in header or len(line) == LONGEST_LINE:
+        raise RecordingError(f"{path}: {NOT_TEXT}")
+    bare = re.sub('"[^"]*"', "", header)
+    delimiter = max((mark for mark in ",;\t" if mark in bare), key=bare.count, default=" ")
+    names = _cells(header, delimiter)
+    if all(is_number(name) for name in names):
+        names, number = _cells(comment.strip("#\r\n "), delimiter), number - 1
+        if len(names) != len(_cells(header, delimiter)):
+            raise RecordingError(
+                f"{path}: line {number + 1} should name the columns, but holds numbers: '{header[:60]}'; "
+                "put a header line such as time,q1,q2,tau1,tau2 before the numbers"
+            )
+    decimal = "," if delimiter == ";" and "," in first and "." not in first else "."
+    return TextTable(path, names, number, delimiter, decimal)
+
+
+def _cells(line: str, delimiter: str) -> tuple[str, ...]:
+    return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), ()))
+
+
+def is_gzip(path: Path) -> bool:
+    """Whether the contents are gzip, whatever the suffix says."""
+    with path.open("rb") as stream:
+        return stream.read(2) == b"\x1f\x8b"
+
+
+@contextmanager
+def open_lines(path: Path) -> Iterator[TextIO]:
+    """The text of the file, decompressed.
+
+    Raises:
+        RecordingError: If the stream is broken off or is not text.
+    """
+    try:
+        opener = gzip.open if is_gzip(path) else open
+        with opener(path, "rt", encoding="utf-8-sig", newline="") as lines:
+            yield lines
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise RecordingError(
+            f"{path}: the gzip stream is broken or cut off ({error}); copy or record the file again"
+        ) from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise RecordingError(f"{path}: {NOT_TEXT}") from error
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell is empty or a number."""
+    try:
+        float(cell or "nan")
+    except ValueError:
+        return cell.strip() in ("", "NA", "N/A", "n/a", "null", "NULL", "#N/A")
+    return True
