@@ -8,15 +8,21 @@ then velocities and accelerations must be there, since nothing can be differenti
 from __future__ import annotations
 
 import dataclasses
+import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from casysid.arrays import Array, frozen
-from casysid.errors import ParameterError, RecordingError
+from casysid.errors import CasysidWarning, ParameterError, RecordingError
+
+if TYPE_CHECKING:
+    from casysid.robot import Robot
 
 GAP = 5.0
 """A step of time longer than this many median steps is a gap."""
@@ -199,9 +205,9 @@ class Recording:
         Raises:
             RecordingError: If the suffix is none of these.
         """
-        from casysid.readers.writing import write_columns
+        from casysid.readers.writing import columns_of, write_columns
 
-        return write_columns(Path(path), _columns(self))
+        return write_columns(Path(path), columns_of(self))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,15 +255,46 @@ class RecordingSummary:
         return "\n".join(lines)
 
 
-def _columns(recording: Recording) -> dict[str, Array]:
-    """The recording's arrays as columns, named by the convention."""
-    columns = {} if recording.time is None else {"time": recording.time}
-    for letter, names, values in (
-        ("q", recording.channels, recording.position),
-        ("v", recording.dofs, recording.velocity),
-        ("a", recording.dofs, recording.acceleration),
-        ("tau", recording.dofs, recording.torque),
-    ):
-        if values is not None:
-            columns |= {f"{letter}_{name}": column for name, column in zip(names, values.T, strict=True)}
-    return columns
+def read_recording(path: str | Path, robot: Robot) -> Recording:
+    """The recording in a CSV (plain or gzipped), Parquet or NPZ file.
+
+    Columns are ``time`` [s], then by joint name ``q_<joint>, v_<joint>, a_<joint>, tau_<joint>``, or numbered
+    ``q1, dq1, ddq1, tau1`` in the model's order; :mod:`casysid.readers.columns` has the other spellings. SI units.
+    Only q and tau are needed beside time; without time the rows are unordered samples, and need all four. Other columns
+    are left aside.
+
+    Warns:
+        CasysidWarning: For everything doubtful that leaves the recording usable.
+
+    Raises:
+        RecordingError: If it cannot be used: file, column and line, and what to do.
+    """
+    from casysid.readers.loading import load_recording
+
+    recording, weaknesses = load_recording(Path(path), robot)
+    for weakness in weaknesses:
+        warnings.warn(f"{path}: {weakness}", CasysidWarning, stacklevel=2)
+    return recording
+
+
+def read_recordings(paths: Sequence[str | Path], robot: Robot) -> tuple[Recording, ...]:
+    """The recordings in several files, in their order; see :func:`read_recording`.
+
+    Raises:
+        RecordingError: If one cannot be used, or a file is given twice.
+    """
+    from casysid.readers.loading import load_recording
+
+    if isinstance(paths, (str, Path)):
+        raise RecordingError(f"read_recordings: wanted a list of files; got one path, {paths}: put it in a list")
+    files = [Path(path).resolve() for path in paths]
+    twice = [str(path) for path, file in zip(paths, files, strict=True) if files.count(file) > 1]
+    if twice:
+        raise RecordingError(
+            f"{twice[0]}: given {len(twice)} times; its samples would count as often. Give each file once"
+        )
+    loaded = [load_recording(Path(path), robot) for path in paths]
+    for path, (_, weaknesses) in zip(paths, loaded, strict=True):
+        for weakness in weaknesses:
+            warnings.warn(f"{path}: {weakness}", CasysidWarning, stacklevel=2)
+    return tuple(recording for recording, _ in loaded)

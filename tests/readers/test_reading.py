@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from casysid.readers import read_recording
 from casysid.readers.columns import match_columns
-from casysid.recording import Recording
+from casysid.recording import Recording, read_recording
 from casysid.robot import Robot
 
 Columns = dict[str, np.ndarray]

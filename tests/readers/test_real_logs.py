@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from casysid.errors import RecordingError
-from casysid.readers import read_recording
+from casysid.recording import read_recording
 from casysid.robot import Robot
 
 DATA = Path(__file__).parents[3] / "shared" / "data"

@@ -10,8 +10,7 @@ import pytest
 from pyarrow import parquet
 
 from casysid.errors import CasysidWarning
-from casysid.readers import read_recording, read_recordings
-from casysid.recording import Recording
+from casysid.recording import Recording, read_recording, read_recordings
 from casysid.robot import Robot
 
 Columns = dict[str, np.ndarray]

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from casysid.errors import ParameterError, RecordingError
-from casysid.readers import read_recording
 from casysid.readers.writing import write_columns
-from casysid.recording import Recording
+from casysid.recording import Recording, read_recording
 from casysid.robot import Robot
 
 FIELDS = ("time", "position", "velocity", "acceleration", "torque")
@@ -140,7 +139,7 @@ def test_what_is_written_is_read_back_exactly(recording: Recording, suffix: str)
     wave = np.sin(np.arange(len(recording)))[:, None] * np.ones(len(recording.dofs))
     plausible = dataclasses.replace(
         recording,
-        position=np.clip(recording.position, -3.0, 3.0) + 1e-3 * wave,
+        position=np.clip(recording.position, -2.0, 2.0) + 1e-3 * wave,
         velocity=None if recording.velocity is None else 0.0 * wave - recording.velocity,
         torque=np.clip(recording.torque, -1e3, 1e3) + wave,
     )
