@@ -1,0 +1,108 @@
+"""The one pass over the data: from samples to :class:`~casysid.moments.Moments`, in chunks and in constant memory.
+
+The row of a joint has nonzeros only in the columns of the bodies that it moves and of its own drive. So each joint
+keeps the sum of squares of its own short rows ``[x, y]``, and only the sums are spread over all columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+from casysid.arrays import Array
+from casysid.dynamics.regressor import Regressor
+from casysid.errors import ParameterError
+from casysid.moments import Moments
+
+
+def accumulate_moments(
+    regressor: Regressor,
+    q: npt.ArrayLike,
+    v: npt.ArrayLike,
+    a: npt.ArrayLike,
+    tau: npt.ArrayLike,
+    *,
+    valid: npt.ArrayLike | None = None,
+    blocks: int = 20,
+    threads: int = 2,
+    progress: Callable[[int, int], None] | None = None,
+) -> Moments:
+    """Sums of ``r rᵀ``, ``r = [x, y]``, over contiguous blocks of time, for each joint.
+
+    Args:
+        regressor: Gives the row ``x`` of each joint.
+        q: Configurations, shape (N, nq).
+        v: Velocities, shape (N, nv).
+        a: Accelerations, shape (N, nv).
+        tau: Torques ``y``, shape (N, nv).
+        valid: Which samples to use, boolean, shape (N,); None uses all.
+        blocks: How many blocks of near-equal length; fewer when there are fewer samples.
+        threads: How many threads to use. The sums do not depend on it.
+        progress: Called with the number of samples done and of all.
+
+    Raises:
+        ParameterError: When a shape does not fit, a sample is not finite, or there is no sample.
+    """
+    inputs, samples = regressor.equations.check((q, v, a, tau))
+    if any(array.ndim != 2 for array in inputs):
+        raise ParameterError(f"moments: q, v, a, tau must be (N, n); got {', '.join(str(x.shape) for x in inputs)}")
+    chosen = _chosen(valid, samples)
+    _require_finite(inputs, chosen)
+    if blocks < 1:
+        raise ParameterError(f"moments: blocks must be at least 1; got {blocks}")
+    groups = np.array_split(chosen, min(blocks, len(chosen)))
+    widths = [len(columns) + 1 for columns in regressor.row_columns]
+    rows, squares = np.cumsum([0, *widths]), np.cumsum([0, *(width**2 for width in widths)])
+
+    def square(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, Array]:
+        packed = np.empty(squares[-1])
+        for joint, width in enumerate(widths):
+            x = values[rows[joint] : rows[joint + 1]]
+            np.matmul(x, x.T, out=packed[squares[joint] : squares[joint + 1]].reshape(width, width))
+        return len(piece), packed
+
+    sums, done = np.zeros((len(groups), squares[-1])), 0
+    with threadpool_limits(1, user_api="blas"):  # threads of ours beside threads of BLAS would wait for each other
+        for block, (count, packed) in regressor.equations.map(square, inputs, groups, threads):
+            sums[block] += packed
+            done += count
+            if progress is not None:
+                progress(done, len(chosen))
+    return _spread(regressor, sums, squares, np.array([len(group) for group in groups], dtype=np.float64))
+
+
+def _spread(regressor: Regressor, sums: Array, squares: npt.NDArray[np.intp], counts: Array) -> Moments:
+    """The joints' short sums in their places among all columns."""
+    p = len(regressor.names)
+    gram = np.zeros((len(sums), regressor.robot.nv, p + 1, p + 1))
+    for joint, columns in enumerate(regressor.row_columns):
+        places, width = np.append(columns, p), len(columns) + 1
+        own = sums[:, squares[joint] : squares[joint + 1]].reshape(-1, width, width)
+        gram[:, joint, places[:, None], places] = own
+    return Moments(gram, np.repeat(counts[:, None], regressor.robot.nv, axis=1), regressor.names, regressor.robot.dofs)
+
+
+def _chosen(valid: npt.ArrayLike | None, samples: int) -> npt.NDArray[np.intp]:
+    """Indices of the samples to use."""
+    mask = np.ones(samples, dtype=bool) if valid is None else np.asarray(valid)
+    if mask.dtype != np.bool_ or mask.shape != (samples,):
+        raise ParameterError(
+            f"moments: valid must be boolean with shape ({samples},); got {mask.dtype} with shape {mask.shape}"
+        )
+    chosen = np.flatnonzero(mask)
+    if len(chosen) == 0:
+        raise ParameterError(f"moments: no sample to sum, {samples} given and {samples} left out")
+    return chosen
+
+
+def _require_finite(inputs: list[Array], chosen: npt.NDArray[np.intp]) -> None:
+    for name, values in zip(("q", "v", "a", "tau"), inputs, strict=True):
+        bad = np.setdiff1d(chosen, np.flatnonzero(np.isfinite(values).all(axis=1)), assume_unique=True)
+        if len(bad):
+            raise ParameterError(
+                f"moments: {name} must be finite; {len(bad)} samples are not, the first is number {bad[0]}; "
+                "leave them out with valid"
+            )
