@@ -13,6 +13,7 @@ from casysid.readers.units import MOST_TURNS, travel_over_integral
 from casysid.recording import Recording
 from casysid.robot import Joint, JointKind, Robot
 
+SLOW = 10.0  # [Hz]
 STILL = 5e-3  # [rad, m]: less is friction's play or the encoder's last digits
 
 
@@ -21,6 +22,7 @@ def find_weaknesses(recording: Recording, robot: Robot) -> tuple[str, ...]:
     searches = (
         _gaps,
         _jitter,
+        _slow,
         _still_joints,
         _outside_limits,
         _turns,
@@ -53,6 +55,14 @@ def _jitter(recording: Recording, robot: Robot) -> Iterator[str]:
                 f"sampling is uneven: nine steps in ten last {low:.3g} to {high:.3g} s; "
                 "derivatives are only as good as the time stamps"
             )
+
+
+def _slow(recording: Recording, robot: Robot) -> Iterator[str]:
+    if recording.rate < SLOW:
+        yield (
+            f"only {recording.rate:.3g} samples a second, too few to follow a robot's motion; "
+            "check that time is in seconds, not milliseconds"
+        )
 
 
 def _still_joints(recording: Recording, robot: Robot) -> Iterator[str]:

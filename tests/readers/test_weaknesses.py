@@ -37,6 +37,11 @@ def jitter(columns: Columns) -> None:
     slow(columns)
 
 
+def milliseconds_at_5_khz(columns: Columns) -> None:
+    columns["time"] = 0.2 * np.arange(400)
+    slow(columns)
+
+
 def still(columns: Columns) -> None:
     for letter in "qva":
         columns[f"{letter}_elbow"] *= 1e-4
@@ -78,6 +83,7 @@ def held(columns: Columns) -> None:
 
 WEAKNESSES: dict[str, tuple[Callable[[Columns], object], str]] = {
     "uneven sampling": (jitter, "sampling is uneven: nine steps in ten last 0.004 to 0.016 s"),
+    "slow sampling": (milliseconds_at_5_khz, "only 5 samples a second"),
     "a joint at rest": (still, "never moving (less than 0.005 rad or m): elbow; friction and much of the inertia"),
     "outside the limits": (shifted, "positions outside the model's limits: slide 0.1 to 0.7 (limits -0.5 to 0.5)"),
     "turns or degrees": (many_turns, "wheel (up to 30): many turns in radians, or degrees?"),
