@@ -13,7 +13,7 @@ from casysid.readers.units import MOST_TURNS, travel_over_integral
 from casysid.recording import Recording
 from casysid.robot import Joint, JointKind, Robot
 
-SLOW = 10.0  # [Hz]
+SLOW = 9.0  # [Hz]
 STILL = 5e-3  # [rad, m]: less is friction's play or the encoder's last digits
 
 

@@ -140,7 +140,7 @@ def test_wrapped_angles_are_unwrapped_and_told(arm: Robot, columns: Columns, tmp
 
 
 def test_a_wheel_within_its_speed_may_turn_as_often_as_it_likes(arm: Robot, columns: Columns, tmp_path: Path) -> None:
-    columns["time"] *= 10.0
+    columns["time"] *= 5.0
     columns["q_wheel"] = 2.0 * columns["time"]
     slow(columns)
     assert read(tmp_path, columns, arm)[1] == []
