@@ -16,17 +16,11 @@ from casysid.errors import ParameterError, RobotError
 from casysid.robot.checks import InertiaFault
 from casysid.robot.model import Joint, JointKind, Robot, SourceFormat
 
-_UNALIGNED = {
-    "JointModelRevoluteUnaligned": JointKind.REVOLUTE,
+_KINDS = {
+    **{f"JointModelR{axis}": JointKind.REVOLUTE for axis in ("X", "Y", "Z", "evoluteUnaligned")},
+    **{f"JointModelRUB{axis}": JointKind.CONTINUOUS for axis in "XYZ"},
+    **{f"JointModelP{axis}": JointKind.PRISMATIC for axis in ("X", "Y", "Z", "rismaticUnaligned")},
     "JointModelRevoluteUnboundedUnaligned": JointKind.CONTINUOUS,
-    "JointModelPrismaticUnaligned": JointKind.PRISMATIC,
-}
-_ALIGNED = {
-    "JointModelR": JointKind.REVOLUTE,
-    "JointModelRUB": JointKind.CONTINUOUS,
-    "JointModelP": JointKind.PRISMATIC,
-}
-_COMPOUND = {
     "JointModelSpherical": JointKind.SPHERICAL,
     "JointModelPlanar": JointKind.PLANAR,
     "JointModelFreeFlyer": JointKind.FREE_FLYER,
@@ -155,10 +149,10 @@ def _list_joints(model: Any, links: Sequence[str | None], source: Path) -> tuple
     if model.njoints == 1:
         raise RobotError(f"{source}: no joint moves; a robot needs at least one joint that is not fixed or locked")
     joints: list[Joint] = []
-    first_channel = 0
+    first_channel, data = 0, model.createData()
     for k in range(1, model.njoints):
         pin_joint, joint_name = model.joints[k], str(model.names[k])
-        kind, axis = _classify(pin_joint, joint_name, source)
+        kind = _kind_of(pin_joint, joint_name, source)
         count = len(_CHANNELS.get(kind, (joint_name,)))
         joints.append(
             Joint(
@@ -166,7 +160,7 @@ def _list_joints(model: Any, links: Sequence[str | None], source: Path) -> tuple
                 kind=kind,
                 parent=int(model.parents[k]) - 1,
                 placement=model.jointPlacements[k].copy(),
-                axis=axis,
+                axis=_axis(data.joints[k].S),
                 q=slice(pin_joint.idx_q, pin_joint.idx_q + pin_joint.nq),
                 v=slice(pin_joint.idx_v, pin_joint.idx_v + pin_joint.nv),
                 channels=slice(first_channel, first_channel + count),
@@ -177,18 +171,19 @@ def _list_joints(model: Any, links: Sequence[str | None], source: Path) -> tuple
     return tuple(joints)
 
 
-def _classify(pin_joint: Any, name: str, source: Path) -> tuple[JointKind, Array]:
-    kind_name = str(pin_joint.shortname())
-    if kind_name in _COMPOUND:
-        return _COMPOUND[kind_name], frozen(np.zeros(3))
-    if kind_name in _UNALIGNED:
-        return _UNALIGNED[kind_name], frozen(np.ravel(pin_joint.extract().axis))
-    if kind_name[:-1] in _ALIGNED and kind_name[-1] in "XYZ":
-        return _ALIGNED[kind_name[:-1]], frozen(np.eye(3)["XYZ".index(kind_name[-1])])
-    raise RobotError(
-        f"{source}: joint '{name}' is a Pinocchio {kind_name}, which is not supported; "
-        f"supported are {', '.join(kind.value for kind in JointKind)} joints"
-    )
+def _kind_of(pin_joint: Any, name: str, source: Path) -> JointKind:
+    kind = _KINDS.get(str(pin_joint.shortname()))
+    if kind is None:
+        raise RobotError(
+            f"{source}: joint '{name}' is a Pinocchio {pin_joint.shortname()}, which is not supported; "
+            f"supported are {', '.join(kind.value for kind in JointKind)} joints"
+        )
+    return kind
+
+
+def _axis(subspace: Array) -> Array:
+    """The axis in a joint's motion subspace (6, n), linear before angular; zeros unless n is 1."""
+    return frozen(subspace[3:] if subspace[3:].any() else subspace[:3]) if subspace.ndim == 1 else frozen(np.zeros(3))
 
 
 def _suffixed(joints: Sequence[Joint], suffixes: dict[JointKind, tuple[str, ...]]) -> tuple[str, ...]:

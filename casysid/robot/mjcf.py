@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,10 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from casysid.arrays import Array
 from casysid.errors import CasysidWarning, RobotError
 from casysid.robot.assembly import assemble_robot
-from casysid.robot.checks import check_gravity, check_inertia, warn_of_faults
+from casysid.robot.checks import InertiaFault, check_gravity, check_inertia, warn_of_faults
 from casysid.robot.locking import lock_joints, lockable_values
 from casysid.robot.mjcf_actuators import scalar_joint_of_actuator
 from casysid.robot.mjcf_tree import body_names, build_pin_model, find_free_root, joint_names
@@ -39,38 +39,17 @@ def read_mjcf(
     if root.tag != "mujoco":
         hint = "; this looks like URDF, use Robot.from_urdf" if root.tag == "robot" else ""
         raise RobotError(f"{path}: the root element is <{root.tag}>, an MJCF has <mujoco>{hint}")
-    with _messages_of_mujoco(path, stacklevel + 2):
-        spec, compiled = compile_mjcf(path)
-    return _robot_of_compiled(spec, compiled, path, gravity, floating_base, locked, stacklevel)
-
-
-def _robot_of_compiled(
-    spec: Any,
-    compiled: Any,
-    path: Path,
-    gravity: npt.ArrayLike | None,
-    floating_base: bool,
-    locked: Mapping[str, float] | None,
-    stacklevel: int,
-) -> Robot:
-    joints = joint_names(compiled)
+    spec, compiled, messages = compile_mjcf(path)
     free_root = find_free_root(compiled, path) if floating_base else None
-    held = lockable_values(locked, joints, path)
-    _refuse_loops(compiled, {name for name, _ in held}, path)
+    held = lockable_values(locked, joint_names(compiled), path)
+    locked_names = {name for name, _ in held}
+    _refuse_loops(compiled, locked_names, path)
     full = build_pin_model(compiled, free_root=free_root)
-    model_gravity = (
-        np.zeros(3) if compiled.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY else compiled.opt.gravity
-    )
-    full.gravity.linear = check_gravity(model_gravity if gravity is None else gravity)
+    full.gravity.linear = _gravity(compiled) if gravity is None else check_gravity(gravity)
     model = lock_joints(full, held, path)
-    carried = _carried_bodies(compiled, free_root, {name for name, _ in held})
+    carried = _carried_bodies(compiled, free_root, locked_names)
     links = [carried.get(str(name)) for name in list(model.names)[1:]]
-    faults = [
-        fault
-        for link, inertia in zip(links, list(model.inertias)[1:], strict=True)
-        if link is not None
-        for fault in check_inertia(link, float(inertia.mass), np.array(inertia.inertia))
-    ]
+    faults = _find_faults(model, links)
     robot = assemble_robot(
         model,
         links,
@@ -81,65 +60,84 @@ def _robot_of_compiled(
         floating_base=free_root is not None,
         locked=held,
     )
-    _warn_of_extras(compiled, path, stacklevel + 2)
-    warn_of_faults(path, faults, stacklevel=stacklevel + 1)
+    for message in messages:
+        warnings.warn(f"{path}: MuJoCo: {message}", CasysidWarning, stacklevel=stacklevel)
+    _warn_of_extras(compiled, path, stacklevel=stacklevel)
+    warn_of_faults(path, faults, stacklevel=stacklevel)
     return robot
 
 
-def compile_mjcf(path: Path) -> tuple[Any, Any]:
-    """The ``MjSpec`` of a file and its ``MjModel``, static bodies kept apart; missing meshes and textures are forgiven.
+def _gravity(compiled: Any) -> Array:
+    return (
+        np.zeros(3) if compiled.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY else compiled.opt.gravity.copy()
+    )
+
+
+def _find_faults(model: Any, links: Sequence[str | None]) -> list[InertiaFault]:
+    faults: list[InertiaFault] = []
+    for link, inertia in zip(links, list(model.inertias)[1:], strict=True):
+        if link is not None:
+            faults += check_inertia(link, float(inertia.mass), np.array(inertia.inertia))
+    return faults
+
+
+def compile_mjcf(path: Path) -> tuple[Any, Any, list[str]]:
+    """The ``MjSpec`` of a file, its ``MjModel`` with static bodies kept apart, and what MuJoCo warned of.
+
+    Missing mesh and texture files are forgiven where no inertia depends on them.
 
     Raises:
         RobotError: MuJoCo refuses the file.
     """
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-        spec.compiler.fusestatic = False
-        return spec, spec.compile()
-    except ValueError as error:
-        if "file" not in str(error):
-            raise _refusal(path, error) from error
-        bare = _without_files(path, error)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
         try:
-            return bare, bare.compile()
-        except ValueError:
-            raise _refusal(path, error) from error
+            spec = _parse(path)
+            compiled = spec.compile()
+        except ValueError as error:
+            if "opening file" not in str(error):
+                raise _refusal(path, error) from error
+            spec, compiled = _compile_without_files(path, error)
+    return spec, compiled, [str(message.message) for message in caught]
 
 
-def _refusal(path: Path, error: ValueError) -> RobotError:
-    reason = " ".join(str(error).split())
-    return RobotError(f"{path}: MuJoCo does not accept the file: {reason}")
-
-
-def _without_files(path: Path, error: ValueError) -> Any:
-    """The spec without geometry from files on bodies that state their inertia: it is not needed for the dynamics.
-
-    Raises:
-        RobotError: The file cannot even be parsed.
-    """
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-    except ValueError:
-        raise _refusal(path, error) from error
+def _parse(path: Path) -> Any:
+    spec = mujoco.MjSpec.from_file(str(path))
     spec.compiler.fusestatic = False
-    for geom in list(spec.geoms):
-        body = geom.parent
-        needless = body.name == "world" or (body.explicitinertial and spec.compiler.inertiafromgeom != 1)
-        if needless and (geom.meshname or geom.hfieldname):
-            spec.delete(geom)
-    for asset in [*spec.skins, *spec.meshes, *spec.hfields, *spec.materials, *spec.textures]:
-        spec.delete(asset)
     return spec
 
 
-@contextmanager
-def _messages_of_mujoco(path: Path, stacklevel: int) -> Iterator[None]:
-    """Passes on what MuJoCo's compiler warns of, with the file's name."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        yield
-    for message in caught:
-        warnings.warn(f"{path}: MuJoCo: {message.message}", CasysidWarning, stacklevel=stacklevel + 1)
+def _refusal(path: Path, error: ValueError, hint: str = "") -> RobotError:
+    reason = " ".join(str(error).split())
+    return RobotError(f"{path}: MuJoCo does not accept the file: {reason}{hint}")
+
+
+def _compile_without_files(path: Path, error: ValueError) -> tuple[Any, Any]:
+    """Spec and model without geometry from files: bodies that state their inertia do not need it.
+
+    Raises:
+        RobotError: The file cannot even be parsed, or a body has its inertia from a missing file.
+    """
+    try:
+        spec = _parse(path)
+    except ValueError:
+        raise _refusal(path, error) from error
+    ignored = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    needed = []
+    for geom in list(spec.geoms):
+        if geom.meshname or geom.hfieldname:
+            if geom.parent.name != "world" and (ignored or not geom.parent.explicitinertial):
+                needed.append(geom.parent.name)
+            spec.delete(geom)
+    if needed:
+        hint = f"; it is needed for the inertia of body '{needed[0]}', which states none (<inertial>)"
+        raise _refusal(path, error, hint) from error
+    for asset in [*spec.skins, *spec.meshes, *spec.hfields, *spec.materials, *spec.textures]:
+        spec.delete(asset)
+    try:
+        return spec, spec.compile()
+    except ValueError:
+        raise _refusal(path, error) from error
 
 
 def _refuse_loops(compiled: Any, locked: Collection[str], path: Path) -> None:
@@ -186,7 +184,7 @@ def _carried_bodies(compiled: Any, free_root: int | None, locked: Collection[str
     return carried
 
 
-def _warn_of_extras(compiled: Any, path: Path, stacklevel: int) -> None:
+def _warn_of_extras(compiled: Any, path: Path, *, stacklevel: int) -> None:
     """One :class:`CasysidWarning` that names forces of the file that the dynamic model does not have."""
     joints, bodies = joint_names(compiled), body_names(compiled)
     extras = []
@@ -214,5 +212,5 @@ def _warn_of_extras(compiled: Any, path: Path, stacklevel: int) -> None:
         warnings.warn(
             f"{path}: not part of the dynamic model: {'; '.join(extras)}. Their torques go into what is identified",
             CasysidWarning,
-            stacklevel=stacklevel,
+            stacklevel=stacklevel + 1,
         )

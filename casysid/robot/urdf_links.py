@@ -99,12 +99,14 @@ def _read_link(element: Element) -> UrdfLink:
         mass = _read_mass(inertial, unreadable)
         com, rpy = _read_origin(inertial, unreadable)
         inertia = _read_inertia(inertial, unreadable)
-        if unreadable:  # the inertia means something only with all of its frame
-            inertia = np.zeros(6)
     faults = [InertiaFault(element.name, FaultKind.UNREADABLE, message) for message in unreadable]
     if not faults:
         faults = check_inertia(element.name, mass, full_inertia(inertia), strict=False)
-    has_inertial = bool(inertial is not None and (faults or mass != 0.0 or inertia.any()))
+    has_inertial = bool(faults or mass != 0.0 or inertia.any())
+    if unreadable:  # an inertia means something only with all of its frame
+        inertia = np.zeros(6)
+    if mass < 0.0:
+        mass, com, inertia = 0.0, np.zeros(3), np.zeros(6)
     return UrdfLink(element.name, element, has_inertial, mass, frozen(com), frozen(rpy), frozen(inertia), tuple(faults))
 
 

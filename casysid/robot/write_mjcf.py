@@ -40,7 +40,7 @@ def mjcf_text(robot: Robot, folder: Path) -> tuple[bytes, list[str]]:
     Raises:
         RobotError: The file cannot say it.
     """
-    spec, compiled = compile_mjcf(robot.source)
+    spec, compiled, _ = compile_mjcf(robot.source)
     _refuse_aligned_bodies(spec, robot.source)
     text, notes = read_bytes(robot.source), []
     root = parse_xml(text, robot.source)
@@ -48,7 +48,7 @@ def mjcf_text(robot: Robot, folder: Path) -> tuple[bytes, list[str]]:
     moved = robot.source.parent.resolve() != folder.resolve()
     includes = any(element.tag == "include" for element in root.walk())
     if elements is None or (includes and (moved or _adjusts_inertia(spec))):
-        text = _flattened(spec)
+        text = _flattened(spec, robot.source)
         root = parse_xml(text, robot.source)
         elements = _locate_bodies(root, compiled)
         notes.append("written as one file: what was included, attached or replicated stands in it")
@@ -81,9 +81,17 @@ def _refuse_aligned_bodies(spec: Any, source: Path) -> None:
             )
 
 
-def _flattened(spec: Any) -> bytes:
+def _flattened(spec: Any, source: Path) -> bytes:
+    """MuJoCo's text of the whole model, as authored.
+
+    Raises:
+        RobotError: An asset's file is missing.
+    """
     spec.compiler.savecompiled = spec.compiler.savecanonical = False
-    return str(spec.to_xml()).encode()
+    try:
+        return str(spec.to_xml()).encode()
+    except ValueError as error:
+        raise RobotError(f"{source}: MuJoCo cannot write the included parts: {' '.join(str(error).split())}") from error
 
 
 def _own(body: Element, tags: tuple[str, ...]) -> list[Element]:
@@ -184,36 +192,28 @@ def _patch_joints(patch: XmlPatch, robot: Robot, spec: Any, compiled: Any, eleme
             "damping": (robot.damping[joint.v] - damping[dofs], compiled.dof_damping[dofs]),
             "frictionloss": (robot.dry_friction[joint.v], compiled.dof_frictionloss[dofs]),
         }
+        sprung = bool((spec.joints[j].springdamper > 0).all())
         for attribute, (values, present) in wanted.items():
-            if not np.allclose(values, present, rtol=1e-15, atol=0.0):
-                notes += _patch_joint(patch, element, joint, attribute, values)
-                if attribute == "damping":
-                    _keep_spring(patch, element, compiled, j, spec.joints[j], float(values.mean()))
+            if not np.allclose(values, present, rtol=1e-15, atol=0.0) or (sprung and attribute == "damping"):
+                higher = compiled.dof_dampingpoly[first] if attribute == "damping" else np.zeros(2)
+                notes += _patch_joint(patch, element, joint, attribute, values, higher)
+        if sprung:  # it would overrule the damping
+            patch.set(element, springdamper="0 0", stiffness=number_text([compiled.jnt_stiffness[j]]))
     return notes
 
 
-def _patch_joint(patch: XmlPatch, element: Element, joint: Joint, attribute: str, values: Array) -> list[str]:
+def _patch_joint(
+    patch: XmlPatch, element: Element, joint: Joint, attribute: str, values: Array, higher: Array
+) -> list[str]:
+    """Sets a joint's value, with the higher orders it has."""
     if element.tag == "freejoint":
         return [f"joint '{joint.name}': <freejoint> has no place for {attribute} {number_text(values)}"]
-    patch.set(element, **{attribute: number_text([values.mean()])})
+    patch.set(element, **{attribute: number_text([values.mean(), *(higher if higher.any() else ())])})
     if np.ptp(values):
-        return [
-            f"joint '{joint.name}': MJCF has one {attribute} for all its directions; the mean of {number_text(values)}"
-        ]
+        return [f"joint '{joint.name}': MJCF has one {attribute} for all directions, the mean of {number_text(values)}"]
     if values[0] < 0.0:
         return [f"joint '{joint.name}': {attribute} is negative, beside what its actuators add"]
     return []
-
-
-def _keep_spring(patch: XmlPatch, element: Element, compiled: Any, j: int, joint: Any, damping: float) -> None:
-    """Higher orders of damping stay; ``springdamper``, which would overrule the damping, gives way to its stiffness."""
-    if element.tag == "freejoint":
-        return
-    orders = compiled.dof_dampingpoly[compiled.jnt_dofadr[j]]
-    if orders.any():
-        patch.set(element, damping=number_text([damping, *orders]))
-    if (joint.springdamper > 0).all():
-        patch.set(element, springdamper="0 0", stiffness=number_text([compiled.jnt_stiffness[j]]))
 
 
 def _neutralise_compiler(patch: XmlPatch, root: Element) -> None:

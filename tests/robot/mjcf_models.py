@@ -36,7 +36,8 @@ CASES = {
         '<frame euler="20 0 0" pos=".1 0 0"><body name="a" childclass="soft"><joint name="j1"/>'
         + INERTIAL
         + '<frame pos="0 0 1">'
-        f'<body name="b" pos="0 0 1" xyaxes="0 1 0 0 0 1"><joint name="j2" class="stiff"/>{TURNED}</body></frame></body></frame>',
+        f'<body name="b" pos="0 0 1" xyaxes="0 1 0 0 0 1"><joint name="j2" class="stiff"/>{TURNED}</body></frame>'
+        "</body></frame>",
         before='<default><joint damping=".1" armature=".01"/><default class="soft"><joint damping=".7" axis="0 1 0"/>'
         '<default class="stiff"><joint frictionloss=".4" armature=".02"/></default></default></default>',
     ),
@@ -45,7 +46,8 @@ CASES = {
     ),
     "replicated fingers": model(
         f'<body name="palm"><joint name="wrist"/>{INERTIAL}<replicate count="3" euler="0 0 120">'
-        f'<body name="finger" pos=".123456789012345 0 0"><joint name="bend" axis="0 1 0"/>{TURNED}</body></replicate></body>'
+        f'<body name="finger" pos=".123456789012345 0 0"><joint name="bend" axis="0 1 0"/>{TURNED}</body></replicate>'
+        "</body>"
     ),
     "inertia from geometry": model(
         '<body name="a"><joint name="j1" axis="0 1 0"/><geom type="capsule" size=".05" fromto="0 0 0 0 0 .3"/>'

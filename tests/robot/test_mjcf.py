@@ -1,16 +1,10 @@
-import re
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from casysid.errors import CasysidWarning, RobotError
 from casysid.robot import JointKind, Robot
-from tests.robot.mjcf_models import CASES, FULL, INERTIAL, model
+from tests.robot.mjcf_models import CASES
 
 DISABLED = (
     mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT | mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS

@@ -1,14 +1,12 @@
-import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from casysid.errors import RobotError
 from casysid.robot import Robot, write_robot
 from tests.robot.bodies import consistent_parameters
-from tests.robot.mjcf_models import CASES, FULL, INERTIAL, TURNED, model
+from tests.robot.mjcf_models import CASES
 
 
 def robot_of(tmp_path, text, **options):
@@ -35,9 +33,7 @@ def test_a_written_model_moves_as_its_parameters_say(name, data, tmp_path):
         damping[joint.v], friction[joint.v], armature[joint.v] = 0.1 * i + 1 / 3, 0.2 * i + 1 / 7, 0.01 * i + 0.1 / 3
     if "free" in name:
         damping, friction, armature = robot.damping, robot.dry_friction, robot.armature
-    written = write_robot(
-        robot, tmp_path / "new.xml", theta, damping=damping, dry_friction=friction, armature=armature
-    )
+    written = write_robot(robot, tmp_path / "new.xml", theta, damping=damping, dry_friction=friction, armature=armature)
     again = Robot.from_mjcf(written.path)
     rng = np.random.default_rng(0)
     for _ in range(3):
