@@ -78,22 +78,21 @@ class Compiled:
         self._kernel(self.inputs.ctypes.data, self.outputs.ctypes.data, self.inputs.shape[1])
 
 
-def compile_kernel(function: Any) -> Kernel | None:
-    """The kernel of an SX function with one output, from the cache or the compiler; None when there is none."""
+def find_kernel(function: Any) -> Kernel | None:
+    """The kernel of an SX function with one output if it was compiled before, by this compiler for this machine."""
     try:
-        library = _library(source := write_source(function))
-        if not library.exists():
-            _build(source, library)
-        return _load(library)
+        library = _library(write_source(function))
+        return _load(library) if library.exists() else None
     except _FAILURES:
         return None
 
 
-def find_kernel(function: Any) -> Kernel | None:
-    """The kernel if it was compiled before, with this compiler for this machine; None if it was not."""
+def compile_kernel(function: Any) -> Kernel | None:
+    """The kernel of an SX function with one output; None when it cannot be compiled here."""
     try:
-        library = _library(write_source(function))
-        return _load(library) if library.exists() else None
+        library = _library(source := write_source(function))
+        _build(source, library)
+        return _load(library)
     except _FAILURES:
         return None
 
@@ -147,6 +146,8 @@ def _build(source: str, library: Path) -> None:
         text, built = Path(directory) / "kernel.c", Path(directory) / library.name
         text.write_text(source)
         _run(_compiler(), *_FLAGS, str(text), "-o", str(built), "-lm")
+        with built.open("rb") as file:
+            os.fsync(file.fileno())  # a library that lost its end crashes whoever loads it
         os.replace(built, library)
     for old in sorted(library.parent.glob("*.so"), key=lambda path: path.stat().st_mtime)[:-_KEPT]:
         old.unlink(missing_ok=True)

@@ -1,0 +1,120 @@
+"""The one pass against its slow and obvious form."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from casysid.accumulation import accumulate_moments
+from casysid.dynamics import Coupling, build_regressor, bulk, replay
+from casysid.errors import ParameterError
+from casysid.moments import Moments
+from casysid.robot import JointKind
+from tests.strategies import generators, random_motion, random_robot, robots
+
+ROBOT = random_robot(np.random.default_rng(0), [JointKind.REVOLUTE, JointKind.PRISMATIC, JointKind.REVOLUTE])
+REGRESSOR = build_regressor(ROBOT, couplings=[Coupling(("joint_1", "joint_3"), (1.0, 1.0))])
+
+
+def log(robot, samples, rng):
+    motion = random_motion(robot, rng, samples)
+    return (*motion, rng.normal(size=(samples, robot.nv)))
+
+
+def slowly(regressor, q, v, a, tau, blocks):
+    """Every row written out, every outer product summed."""
+    Y = np.array([regressor.function(*state).full() for state in zip(q, v, a, strict=True)])
+    rows = np.concatenate([Y, tau[:, :, None]], axis=2)
+    parts = np.array_split(rows, blocks)
+    gram = np.array([[part[:, j].T @ part[:, j] for j in range(regressor.robot.nv)] for part in parts])
+    count = np.array([[len(part)] * regressor.robot.nv for part in parts], dtype=float)
+    return Moments(gram, count, regressor.names, regressor.robot.dofs)
+
+
+def assert_same(got, wanted, relative=1e-12):
+    scale = np.abs(wanted.gram).max(axis=(2, 3), keepdims=True)
+    np.testing.assert_allclose(got.gram / scale, wanted.gram / scale, rtol=0, atol=relative)
+    np.testing.assert_array_equal(got.count, wanted.count)
+    assert (got.columns, got.joints) == (wanted.columns, wanted.joints)
+
+
+@settings(max_examples=20, deadline=None)
+@given(robots(max_joints=3), generators(), st.integers(1, 5))
+def test_moments_are_the_sums_of_outer_products(robot, rng, blocks):
+    regressor = build_regressor(robot)
+    samples = log(robot, 12, rng)
+    assert_same(accumulate_moments(regressor, *samples, blocks=blocks), slowly(regressor, *samples, blocks))
+
+
+def test_couplings_are_summed_too():
+    samples = log(ROBOT, 30, np.random.default_rng(1))
+    assert_same(accumulate_moments(REGRESSOR, *samples, blocks=3), slowly(REGRESSOR, *samples, 3))
+
+
+def test_the_sums_do_not_depend_on_threads_or_chunks(monkeypatch):
+    samples = log(ROBOT, 20_000, np.random.default_rng(2))
+    once = accumulate_moments(REGRESSOR, *samples, blocks=3, threads=1)
+    np.testing.assert_array_equal(accumulate_moments(REGRESSOR, *samples, blocks=3, threads=3).gram, once.gram)
+    monkeypatch.setattr(replay, "SAMPLES", 700)
+    assert_same(accumulate_moments(REGRESSOR, *samples, blocks=3), once)
+
+
+def test_both_routes_give_the_same_sums(tmp_path, monkeypatch):
+    samples = log(ROBOT, 3000, np.random.default_rng(3))
+    replayed = accumulate_moments(build_regressor(ROBOT), *samples)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(bulk, "FIND_FROM", 0)
+    monkeypatch.setattr(bulk, "COMPILE_FROM", 0)
+    regressor = build_regressor(ROBOT)
+    both = accumulate_moments(regressor, *samples)
+    if regressor.equations.route == "replay":
+        pytest.skip("no compiler here")
+    assert_same(both, replayed)
+
+
+def test_parts_of_a_log_add_up_to_the_whole():
+    samples = log(ROBOT, 400, np.random.default_rng(4))
+    whole = accumulate_moments(REGRESSOR, *samples, blocks=4)
+    halves = [
+        accumulate_moments(REGRESSOR, *(x[part] for x in samples), blocks=2) for part in (slice(200), slice(200, None))
+    ]
+    assert_same(halves[0] + halves[1], whole)
+
+
+def test_samples_that_are_not_valid_are_as_if_never_logged():
+    samples = log(ROBOT, 90, np.random.default_rng(5))
+    valid = np.arange(90) % 3 != 0
+    samples[3][~valid] = np.nan
+    left = accumulate_moments(REGRESSOR, *(x[valid] for x in samples), blocks=4)
+    assert_same(accumulate_moments(REGRESSOR, *samples, valid=valid, blocks=4), left)
+
+
+def test_there_are_never_more_blocks_than_samples():
+    samples = log(ROBOT, 3, np.random.default_rng(6))
+    moments = accumulate_moments(REGRESSOR, *samples, blocks=20)
+    assert moments.blocks == 3
+    assert (moments.count == 1).all()
+
+
+def test_progress_reaches_the_end():
+    told = []
+    accumulate_moments(REGRESSOR, *log(ROBOT, 9000, np.random.default_rng(7)), progress=lambda *x: told.append(x))
+    assert told[-1] == (9000, 9000)
+    assert told == sorted(told)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tau": np.zeros((10, 2))}, r"wants q \(N, 3\).*tau \(N, 3\); got"),
+        ({"tau": np.zeros(3)}, r"must be \(N, n\)"),
+        ({"a": np.full((10, 3), np.inf)}, "a must be finite; 10 samples are not, the first is number 0"),
+        ({"valid": np.zeros(10, dtype=bool)}, "no sample to sum, 10 given and 10 left out"),
+        ({"valid": np.zeros(10)}, "valid must be boolean"),
+        ({"blocks": 0}, "blocks must be at least 1; got 0"),
+    ],
+)
+def test_a_log_that_cannot_be_summed_is_refused(change, message):
+    arguments = dict(zip("q v a tau".split(), log(ROBOT, 10, np.random.default_rng(8)), strict=True)) | change
+    with pytest.raises(ParameterError, match=message):
+        accumulate_moments(REGRESSOR, **arguments)
