@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,8 @@ import pinocchio as pin
 
 from casysid.arrays import Array
 from casysid.inertia import MassProperties, mass_properties, parameters_from_pseudo_inertia, pseudo_inertia
+
+_HELD_SHARE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,30 +46,38 @@ def joint_parts(model: Any, known: Mapping[str, tuple[Array | None, bool]]) -> l
     return parts[1:]
 
 
-def share_out(theta: Array, parts: Sequence[Part]) -> dict[str, MassProperties | None]:
+def sum_of(parts: Sequence[Part]) -> Array:
+    """Parameters of the whole body at the joint frame, shape (10,), from those parts that have any."""
+    return sum((_moved(part.parameters, part.placement) for part in parts if part.parameters is not None), np.zeros(10))
+
+
+def share_out(theta: Array, parts: Sequence[Part], jointed: Collection[str]) -> dict[str, MassProperties | None]:
     """New properties of parts, by name, so that together they have ``theta`` at the joint frame; absent parts stay.
 
     The main part (the first that has an inertia) takes what the others leave, if that is a body. Otherwise it takes
-    everything, and the others become massless (None).
+    everything, and the others become massless (None), except those with a joint of their own, which is locked:
+    simulators want them to have mass, so they get a thousandth of everything, as consistent as the whole.
     """
     main = next((part for part in parts if part.massive), parts[0])
     others = [part for part in parts if part is not main and part.massive]
-    rest = theta.copy()
-    for part in others:
-        rest -= _moved(part.parameters, part.placement) if part.parameters is not None else np.inf
-    share = mass_properties(_moved(rest, main.placement.inverse())) if np.isfinite(rest).all() else None
-    if not others or (share is not None and is_body(share)):
-        return {main.name: share}
-    return {
-        main.name: mass_properties(_moved(theta, main.placement.inverse())),
-        **dict.fromkeys(p.name for p in others),
-    }
+    if all(part.parameters is not None for part in others):
+        share = _seen_from(main, theta - sum_of(others))
+        if not others or is_body(share):
+            return {main.name: share}
+    held = [part for part in others if part.name in jointed]
+    fixed = dict.fromkeys(part.name for part in others if part.name not in jointed)
+    small = {part.name: _seen_from(part, _HELD_SHARE * theta) for part in held}
+    return {main.name: _seen_from(main, (1.0 - _HELD_SHARE * len(held)) * theta), **small, **fixed}
 
 
 def is_body(share: MassProperties) -> bool:
     """Whether mass and principal moments are positive and no moment exceeds the sum of the other two."""
     moments = np.linalg.eigvalsh(share.inertia)
     return bool(share.mass > 0.0 and moments[0] > 0.0 and moments[2] <= moments[0] + moments[1])
+
+
+def _seen_from(part: Part, theta: Array) -> MassProperties:
+    return mass_properties(_moved(theta, part.placement.inverse()))
 
 
 def _moved(theta: Array, placement: Any) -> Array:

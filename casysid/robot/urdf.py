@@ -12,10 +12,11 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from casysid.arrays import Array
-from casysid.errors import RobotError
-from casysid.robot.assembly import assemble_robot
+from casysid.errors import ParameterError, RobotError
+from casysid.robot.assembly import assemble_robot, inertia_from_parameters
 from casysid.robot.checks import FaultKind, InertiaFault, check_gravity, check_inertia, warn_of_faults
 from casysid.robot.locking import lock_joints, lockable_values
+from casysid.robot.lumping import joint_parts, sum_of
 from casysid.robot.model import Robot
 from casysid.robot.urdf_joints import UrdfJoint, read_joints, warn_of_doubts
 from casysid.robot.urdf_links import UrdfLink, read_links
@@ -49,7 +50,7 @@ def read_urdf(
     full.gravity.linear = check_gravity(_EARTH if gravity is None else gravity)
     model = lock_joints(full, held, path)
     carried = {joint.name: joint.child for joint in joints.values()}
-    faults = _find_faults(model, links)
+    faults = _find_faults(model, links, path)
     robot = assemble_robot(
         model,
         [carried.get(name, base) for name in list(model.names)[1:]],
@@ -180,15 +181,20 @@ def _joint_text(joint: UrdfJoint) -> str:
     )
 
 
-def _find_faults(model: Any, links: Mapping[str, UrdfLink]) -> list[InertiaFault]:
-    """Complaints about moving links: each one's own numbers, and each lumped body as a whole."""
-    bodies: dict[int, list[UrdfLink]] = {}
-    for frame in model.frames:
-        if frame.type == pin.FrameType.BODY and frame.name in links:
-            bodies.setdefault(int(frame.parentJoint), []).append(links[frame.name])
+def _find_faults(model: Any, links: Mapping[str, UrdfLink], path: Path) -> list[InertiaFault]:
+    """Complaints about moving links: each one's own numbers, and each lumped body as a whole.
+
+    The bodies are summed here and put into the model, as Pinocchio's own sum is wrong where a mass is negative.
+    """
     faults: list[InertiaFault] = []
-    for k in range(1, model.njoints):
-        faults += _body_faults(bodies[k], float(model.inertias[k].mass), np.array(model.inertias[k].inertia))
+    known = {link.name: (link.parameters(), link.has_inertial) for link in links.values()}
+    for k, parts in enumerate(joint_parts(model, known), 1):
+        try:
+            model.inertias[k] = inertia_from_parameters(sum_of(parts), parts[0].name)
+        except ParameterError as error:
+            raise RobotError(f"{path}: {error}") from error
+        inertia = model.inertias[k]
+        faults += _body_faults([links[part.name] for part in parts], float(inertia.mass), np.array(inertia.inertia))
     return faults
 
 

@@ -14,6 +14,7 @@ import pinocchio as pin
 
 from casysid.arrays import Array, frozen
 from casysid.errors import RobotError
+from casysid.inertia import inertial_parameters
 from casysid.robot.checks import FaultKind, InertiaFault, check_inertia
 from casysid.robot.xmltext import Element
 
@@ -44,10 +45,10 @@ class UrdfLink:
     inertia: Array
     faults: tuple[InertiaFault, ...]
 
-    def central_inertia(self) -> Array:
-        """Inertia about the centre of mass, along the axes of the link frame, shape (3, 3), [kg m²]."""
+    def parameters(self) -> Array:
+        """The ten inertial parameters at the link frame, as far as they could be read."""
         R = pin.rpy.rpyToMatrix(*map(float, self.rpy))
-        return np.asarray(R @ full_inertia(self.inertia) @ R.T)
+        return inertial_parameters(self.mass, self.com, R @ full_inertia(self.inertia) @ R.T)
 
 
 def read_number(text: str) -> float:
@@ -105,8 +106,6 @@ def _read_link(element: Element) -> UrdfLink:
     has_inertial = bool(faults or mass != 0.0 or inertia.any())
     if unreadable:  # an inertia means something only with all of its frame
         inertia = np.zeros(6)
-    if mass < 0.0:
-        mass, com, inertia = 0.0, np.zeros(3), np.zeros(6)
     return UrdfLink(element.name, element, has_inertial, mass, frozen(com), frozen(rpy), frozen(inertia), tuple(faults))
 
 

@@ -128,10 +128,11 @@ def _patch_inertials(
     names, notes = body_names(compiled), []
     own = {names[b]: _compiled_parameters(compiled, b) for b in range(1, compiled.nbody)}
     known = {name: (theta, bool(theta.any())) for name, theta in own.items()}
+    jointed = {names[b] for b in range(1, compiled.nbody) if compiled.body_jntnum[b]}
     shares: dict[str, MassProperties | None] = {}
     carrying = [(j, parts) for j, parts in zip(robot.joints, joint_parts(robot.model, known), strict=True) if j.link]
     for (joint, parts), theta in zip(carrying, robot.inertial_parameters.reshape(-1, 10), strict=True):
-        new = share_out(theta, parts)
+        new = share_out(theta, parts, jointed)
         notes += [
             f"body '{n}': its inertia is part of body '{joint.link}'" for n, share in new.items() if share is None
         ]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-from casysid.inertia import MassProperties, inertial_parameters
+from casysid.inertia import MassProperties
 from casysid.robot.lumping import joint_parts, share_out
 from casysid.robot.model import Joint, JointKind, Robot
 from casysid.robot.urdf_joints import UrdfJoint, read_joints
-from casysid.robot.urdf_links import UrdfLink, read_links
+from casysid.robot.urdf_links import read_links
 from casysid.robot.xmlpatch import XmlPatch, comment, element_text, number_text, path_from
 from casysid.robot.xmltext import Element, parse_xml, read_bytes
 
@@ -22,10 +21,11 @@ def urdf_text(robot: Robot, folder: Path) -> tuple[bytes, list[str]]:
     root = parse_xml(text, robot.source)
     links, joints = read_links(root, robot.source), read_joints(root, robot.source)
     patch, notes = XmlPatch(text), []
-    known = {link.name: (_trusted_parameters(link), link.has_inertial) for link in links.values()}
+    known = {link.name: (None if link.faults else link.parameters(), link.has_inertial) for link in links.values()}
+    jointed = {joint.child for joint in joints.values() if joint.kind != "fixed"}
     parts = joint_parts(robot.model, known)
     for joint, own_parts, theta in zip(robot.joints, parts, robot.inertial_parameters.reshape(-1, 10), strict=True):
-        for name, share in share_out(theta, own_parts).items():
+        for name, share in share_out(theta, own_parts, jointed).items():
             if share is None:
                 notes.append(f"link '{name}': its inertia is part of link '{joint.link}'")
                 _drop_inertial(patch, links[name].element, str(joint.link))
@@ -37,12 +37,6 @@ def urdf_text(robot: Robot, folder: Path) -> tuple[bytes, list[str]]:
         patch.prepend(root, comment(note))
     _redirect_files(patch, root, robot.source.parent, folder)
     return patch.result(), notes
-
-
-def _trusted_parameters(link: UrdfLink) -> Any:
-    if link.faults:
-        return None
-    return inertial_parameters(link.mass, link.com, link.central_inertia())
 
 
 def _drop_inertial(patch: XmlPatch, link: Element, carrier: str) -> None:
