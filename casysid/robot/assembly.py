@@ -16,6 +16,7 @@ from casysid.errors import ParameterError, RobotError
 from casysid.robot.checks import InertiaFault
 from casysid.robot.model import Joint, JointKind, Robot, SourceFormat
 
+ROOT_JOINT = "root_joint"  # Pinocchio's name for the free joint under a floating base
 _KINDS = {
     **{f"JointModelR{axis}": JointKind.REVOLUTE for axis in ("X", "Y", "Z", "evoluteUnaligned")},
     **{f"JointModelRUB{axis}": JointKind.CONTINUOUS for axis in "XYZ"},

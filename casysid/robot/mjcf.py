@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from casysid.arrays import Array
 from casysid.errors import CasysidWarning, RobotError
-from casysid.robot.assembly import assemble_robot
+from casysid.robot.assembly import ROOT_JOINT, assemble_robot
 from casysid.robot.checks import InertiaFault, check_gravity, check_inertia, warn_of_faults
 from casysid.robot.locking import lock_joints, lockable_values
 from casysid.robot.mjcf_actuators import scalar_joint_of_actuator
@@ -163,9 +163,11 @@ def _refuse_loops(compiled: Any, locked: Collection[str], path: Path) -> None:
                 continue
             ends = " of " + " and ".join(f"joint '{name}'" for name in names)
             remedy = f"lock it (locked={{'{names[0]}': 0.0}}), or {remedy}"
-        elif kind in ("connect", "weld") and compiled.eq_objtype[k] == mujoco.mjtObj.mjOBJ_BODY:
-            bodies = body_names(compiled)
-            ends = f" of bodies '{bodies[compiled.eq_obj1id[k]]}' and '{bodies[compiled.eq_obj2id[k]]}'"
+        elif kind in ("connect", "weld"):
+            on_bodies = compiled.eq_objtype[k] == mujoco.mjtObj.mjOBJ_BODY
+            names = body_names(compiled) if on_bodies else [compiled.site(s).name for s in range(compiled.nsite)]
+            what = "bodies" if on_bodies else "sites"
+            ends = f" of {what} '{names[compiled.eq_obj1id[k]]}' and '{names[compiled.eq_obj2id[k]]}'"
         name = f" '{compiled.equality(k).name}'" if compiled.equality(k).name else ""
         raise RobotError(f"{path}: equality constraint <{kind}>{name}{ends}: closed loops are not supported; {remedy}")
 
@@ -180,7 +182,7 @@ def _carried_bodies(compiled: Any, free_root: int | None, locked: Collection[str
         if own:
             carried[own[-1]] = bodies[b]
         elif b == free_root:
-            carried["root_joint"] = bodies[b]
+            carried[ROOT_JOINT] = bodies[b]
     return carried
 
 
@@ -201,6 +203,8 @@ def _warn_of_extras(compiled: Any, path: Path, *, stacklevel: int) -> None:
         extras.append(f"gravcomp of bodies {', '.join(floating)}")
     if compiled.ntendon:
         extras.append(f"tendons ({compiled.ntendon})")
+    if compiled.nflex:
+        extras.append(f"deformable bodies ({compiled.nflex})")
     if compiled.opt.density or compiled.opt.viscosity:
         extras.append("the fluid around the robot")
     for k in range(compiled.nu):

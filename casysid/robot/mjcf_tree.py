@@ -5,6 +5,7 @@ Pinocchio's own MJCF parser knows no includes, frames, or unnamed bodies, and dr
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -13,9 +14,9 @@ import pinocchio as pin
 
 from casysid.arrays import Array
 from casysid.errors import RobotError
+from casysid.robot.assembly import ROOT_JOINT
 from casysid.robot.mjcf_actuators import actuator_reflection, effort_limit
 
-_ROOT_JOINT = "root_joint"  # Pinocchio's name for the free joint under a floating base
 _JOINT = mujoco.mjtJoint
 
 
@@ -24,8 +25,8 @@ def joint_names(compiled: Any) -> list[str]:
     given = [compiled.joint(j).name for j in range(compiled.njnt)]
     names: list[str] = []
     for j, name in enumerate(given):
-        free = compiled.jnt_type[j] == _JOINT.mjJNT_FREE and _ROOT_JOINT not in (*given, *names)
-        names.append(name or (_ROOT_JOINT if free else f"joint{j}"))
+        free = compiled.jnt_type[j] == _JOINT.mjJNT_FREE and ROOT_JOINT not in (*given, *names)
+        names.append(name or (ROOT_JOINT if free else f"joint{j}"))
     return names
 
 
@@ -52,7 +53,7 @@ def build_pin_model(compiled: Any, *, free_root: int | None = None) -> Any:
         pose = pose * _pose(compiled.body_pos[b], compiled.body_quat[b])
         if b == free_root:
             carrier, pose = (
-                model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), _ROOT_JOINT),
+                model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT_JOINT),
                 pin.SE3.Identity(),
             )
             model.addJointFrame(carrier)
@@ -120,7 +121,7 @@ def _set(model: Any, name: str, where: slice | int, value: Any) -> None:
     setattr(model, name, values)
 
 
-def find_free_root(compiled: Any, source: Any) -> int | None:
+def find_free_root(compiled: Any, source: Path) -> int | None:
     """The body to put a free joint under for a floating base; None if it floats already.
 
     Raises:
@@ -133,5 +134,10 @@ def find_free_root(compiled: Any, source: Any) -> int | None:
         names = ", ".join(f"'{body_names(compiled)[b]}'" for b in roots)
         raise RobotError(f"{source}: floating_base: which of the bodies {names} is the base? Give it a <freejoint/>")
     base = roots[0]
-    floats = compiled.body_jntnum[base] and compiled.jnt_type[compiled.body_jntadr[base]] == _JOINT.mjJNT_FREE
-    return None if floats else base
+    if compiled.body_jntnum[base] and compiled.jnt_type[compiled.body_jntadr[base]] == _JOINT.mjJNT_FREE:
+        return None
+    if ROOT_JOINT in joint_names(compiled):
+        raise RobotError(
+            f"{source}: floating_base: a joint is named '{ROOT_JOINT}' already, which the free joint would be"
+        )
+    return base

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from casysid.arrays import Array
 from casysid.errors import ParameterError, RobotError
-from casysid.robot.assembly import assemble_robot, inertia_from_parameters
+from casysid.robot.assembly import ROOT_JOINT, assemble_robot, inertia_from_parameters
 from casysid.robot.checks import FaultKind, InertiaFault, check_gravity, check_inertia, warn_of_faults
 from casysid.robot.locking import lock_joints, lockable_values
 from casysid.robot.lumping import joint_parts, sum_of
@@ -46,6 +46,10 @@ def read_urdf(
     held = lockable_values(locked, [joint.name for joint in joints.values() if joint.kind != "fixed"], path)
     _refuse_mimics(joints.values(), held, path)
     adds_joint = floating_base and not _floats_already(base, joints)
+    if adds_joint and ROOT_JOINT in joints:
+        raise RobotError(
+            f"{path}: floating_base: a joint is named '{ROOT_JOINT}' already, which the free joint would be"
+        )
     full = _build_model(root.name or path.stem, links, joints, path, floating_base=adds_joint)
     full.gravity.linear = check_gravity(_EARTH if gravity is None else gravity)
     model = lock_joints(full, held, path)

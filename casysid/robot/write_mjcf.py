@@ -6,6 +6,7 @@ Bodies and joints are found by their order in the text, which is MuJoCo's. Where
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +90,9 @@ def _flattened(spec: Any, source: Path) -> bytes:
     """
     spec.compiler.savecompiled = spec.compiler.savecanonical = False
     try:
-        return str(spec.to_xml()).encode()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the same as when it was read
+            return str(spec.to_xml()).encode()
     except ValueError as error:
         raise RobotError(f"{source}: MuJoCo cannot write the included parts: {' '.join(str(error).split())}") from error
 

@@ -107,6 +107,11 @@ def test_a_floating_base_is_put_under_the_one_body_in_the_world(read):
         read(model(PAIR + f'<body name="c"><joint/>{FULL}</body>'), floating_base=True)
 
 
+def test_the_name_of_the_free_joint_must_be_free(read):
+    with pytest.raises(RobotError, match="floating_base: a joint is named 'root_joint' already"):
+        read(model(PAIR.replace("j2", "root_joint")), floating_base=True)
+
+
 def test_a_locked_joint_joins_its_body_to_the_one_before(read):
     free, locked = read(model(PAIR)), read(model(PAIR), locked={"j2": 0.4})
     assert (locked.links, locked.dofs) == (("a",), ("j1",))
@@ -121,6 +126,7 @@ def test_a_locked_joint_joins_its_body_to_the_one_before(read):
 LOOPS = {
     "connect": ('<connect name="rod" body1="a" body2="b" anchor="0 0 0"/>', "<connect> 'rod' of bodies 'a' and 'b'"),
     "weld": ('<weld body1="b"/>', "<weld> of bodies 'b' and 'world'"),
+    "sites": ('<weld site1="s" site2="t"/>', "<weld> of sites 's' and 't'"),
     "joint": ('<joint joint1="j2" joint2="j1"/>', r"<joint> of joint 'j2' and joint 'j1'.*locked=\{'j2': 0.0\}"),
 }
 
@@ -128,10 +134,11 @@ LOOPS = {
 @pytest.mark.parametrize("name", LOOPS)
 def test_a_closed_loop_is_refused_by_name(name, read):
     text, message = LOOPS[name]
+    bodies = PAIR + '<site name="s"/><site name="t"/>'
     with pytest.raises(RobotError, match=f"equality constraint {message}"):
-        read(model(PAIR, after=f"<equality>{text}</equality>"))
+        read(model(bodies, after=f"<equality>{text}</equality>"))
     inactive = text.replace("/>", ' active="false"/>')
-    assert read(model(PAIR, after=f"<equality>{inactive}</equality>")).nv == 2
+    assert read(model(bodies, after=f"<equality>{inactive}</equality>")).nv == 2
 
 
 def test_a_coupled_joint_can_be_locked(read):

@@ -90,6 +90,15 @@ def test_a_floating_base_is_not_made_to_float_twice(read):
     assert not robot.floating_base
 
 
+def test_the_name_of_the_free_joint_must_be_free(read):
+    with pytest.raises(RobotError, match="floating_base: a joint is named 'root_joint' already"):
+        read(ARM.replace('name="elbow"', 'name="root_joint"'), floating_base=True)
+
+
+def test_a_joint_and_a_link_may_share_a_name(read):
+    assert read(ARM.replace('name="elbow"', 'name="upper"')).links == ("upper", "lower")
+
+
 def test_a_locked_joint_joins_its_link_to_the_one_before(read):
     free, locked = read(ARM), read(ARM, locked={"elbow": 0.7})
     assert (locked.links, locked.dofs) == (("upper",), ("shoulder",))
