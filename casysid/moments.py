@@ -92,7 +92,10 @@ class Moments:
         if (self.columns, self.joints) != (other.columns, other.joints):
             raise ParameterError("moments: only moments with the same columns and joints can be added")
         return Moments(
-            np.concatenate([self.gram, other.gram]), np.concatenate([self.count, other.count]), self.columns, self.joints
+            np.concatenate([self.gram, other.gram]),
+            np.concatenate([self.count, other.count]),
+            self.columns,
+            self.joints,
         )
 
     @property
@@ -107,9 +110,11 @@ class Moments:
 
     def shifted(self, parameters: Array) -> Moments:
         """The moments of ``[x, y - xᵀ θ0]``: what is left to explain beside ``parameters`` θ0, shape (p,)."""
-        transform = np.eye(len(self.columns) + 1)
-        transform[:-1, -1] = -parameters
-        return Moments(transform.T @ self.gram @ transform, self.count, self.columns, self.joints)
+        gram = self.gram.copy()
+        reduced = gram[..., :-1, -1] - gram[..., :-1, :-1] @ parameters  # x (y - xᵀθ0)
+        gram[..., -1, -1] = np.maximum(gram[..., -1, -1] - (gram[..., -1, :-1] + reduced) @ parameters, 0.0)
+        gram[..., :-1, -1] = gram[..., -1, :-1] = reduced
+        return Moments(gram, self.count, self.columns, self.joints)
 
     def pooled(self, weights: npt.ArrayLike | None = None) -> NormalEquations:
         """Sum over blocks and joints, the rows of each joint multiplied by its weight ``1/σ²`` (shape (joints,), default 1)."""
@@ -122,7 +127,7 @@ class Moments:
     def residual_energy(self, parameters: Array) -> Array:
         """``Σ (y - xᵀθ)²`` by block and joint, shape (blocks, joints), for parameters of shape (p,)."""
         r = np.append(-parameters, 1.0)
-        return np.maximum(np.einsum("m,bjmn,n->bj", r, self.gram, r), 0.0)
+        return np.asarray(np.maximum(np.einsum("m,bjmn,n->bj", r, self.gram, r), 0.0))
 
     def target_energy(self) -> Array:
         """``Σ y²`` by block and joint, shape (blocks, joints)."""

@@ -40,7 +40,12 @@ def speaking() -> Iterator[Console]:
 @contextmanager
 def progress_bar(console: Console) -> Iterator[Callable[[str, float], None]]:
     """A bar that names the stage at work."""
-    columns = (TextColumn("{task.description:<12}"), BarColumn(bar_width=32), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn())
+    columns = (
+        TextColumn("{task.description:<12}"),
+        BarColumn(bar_width=32),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=console, transient=True) as bar:
         tasks: dict[str, int] = {}
 
@@ -56,7 +61,9 @@ def progress_bar(console: Console) -> Iterator[Callable[[str, float], None]]:
 
 def rich_table(title: str, header: tuple[str, ...], rows: tuple[tuple[str, ...], ...]) -> RichTable:
     """A table for the terminal: first column to the left, numbers to the right."""
-    table = RichTable(title=title, title_justify="left", title_style="bold", header_style="dim", box=None, pad_edge=False)
+    table = RichTable(
+        title=title, title_justify="left", title_style="bold", header_style="dim", box=None, pad_edge=False
+    )
     for k, name in enumerate(header):
         table.add_column(_plain(name), justify="left" if k == 0 else "right")
     for row in rows:

@@ -31,7 +31,8 @@ def identify(
     robot: RobotArgument,
     logs: LogsArgument,
     held_out: Annotated[
-        list[Path] | None, typer.Option("--held-out", metavar="LOG", help="A recording to predict, never fitted. Repeatable.")
+        list[Path] | None,
+        typer.Option("--held-out", metavar="LOG", help="A recording to predict, never fitted. Repeatable."),
     ] = None,
     split: Annotated[
         float | None, typer.Option(help="Fit on this first share of each recording's time, hold out the rest.")
@@ -51,7 +52,9 @@ def identify(
     export_inconsistent: Annotated[
         bool, typer.Option("--export-inconsistent", help="Write the model file even if no body can have its inertias.")
     ] = False,
-    out: Annotated[Path, typer.Option(help="Folder for result.json, the identified model and report.html.")] = Path("identified"),
+    out: Annotated[Path, typer.Option(help="Folder for result.json, the identified model and report.html.")] = Path(
+        "identified"
+    ),
 ) -> None:
     """Identify the inertial and friction parameters of ROBOT from recordings."""
     from casysid.cli.console import SOLVER_FAILED, progress_bar, speaking
@@ -86,7 +89,9 @@ def _settings(method: str, consistency: ConsistencyChoice, cutoff: float | None,
         method=estimator_by_name(method),
         consistency=None if consistency is ConsistencyChoice.NONE else Consistency(consistency.value),
         cutoff=cutoff,
-        couplings=tuple(Coupling(joints=tuple(text.split("+"))) for text in couplings),
+        couplings=tuple(
+            Coupling(joints=(names := tuple(text.split("+"))), weights=(1.0,) * len(names)) for text in couplings
+        ),
     )
 
 

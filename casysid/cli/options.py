@@ -10,7 +10,9 @@ import typer
 if TYPE_CHECKING:
     from casysid.robot import Robot
 
-RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="URDF or MJCF file, or the name of a bundled model.")]
+RobotArgument = Annotated[
+    str, typer.Argument(metavar="ROBOT", help="URDF or MJCF file, or the name of a bundled model.")
+]
 LogsArgument = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings: CSV, CSV.gz, Parquet or NPZ.")]
 GravityOption = Annotated[
     tuple[float, float, float] | None,
@@ -19,7 +21,9 @@ GravityOption = Annotated[
 LockOption = Annotated[
     list[str] | None, typer.Option("--lock", metavar="JOINT=VALUE", help="Hold a joint fixed [rad or m]. Repeatable.")
 ]
-FloatingOption = Annotated[bool, typer.Option("--floating-base", help="The base is free to move (six more degrees of freedom).")]
+FloatingOption = Annotated[
+    bool, typer.Option("--floating-base", help="The base is free to move (six more degrees of freedom).")
+]
 
 
 def load_robot(
@@ -41,5 +45,7 @@ def _locked(pairs: list[str]) -> dict[str, float]:
         try:
             locked[joint] = float(value)
         except ValueError as error:
-            raise ParameterError(f"--lock wants JOINT=VALUE with a number, such as gripper=0.02; got {pair!r}") from error
+            raise ParameterError(
+                f"--lock wants JOINT=VALUE with a number, such as gripper=0.02; got {pair!r}"
+            ) from error
     return locked

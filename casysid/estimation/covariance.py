@@ -32,7 +32,9 @@ def block_covariance(moments: Moments, parameters: Array, weights: Array) -> Arr
     values, vectors = np.linalg.eigh(np.einsum("j,jmn->mn", weights, gram) * np.outer(scale, scale))
     seen = values > SPECTRUM_TOLERANCE * max(values.max(initial=0.0), np.finfo(np.float64).tiny)
     basis = scale[:, None] * vectors[:, seen]  # (p, r), standardised directions
-    freedom = np.maximum(moments.count.sum(axis=0) * (1.0 - seen.sum() / max(moments.count.sum(), seen.sum() + 1.0)), 1.0)
+    freedom = np.maximum(
+        moments.count.sum(axis=0) * (1.0 - seen.sum() / max(moments.count.sum(), seen.sum() + 1.0)), 1.0
+    )
     variance = moments.residual_energy(parameters).sum(axis=0) / freedom  # (joints,)
     white = np.einsum("jmn,mr,ns->jrs", gram, basis, basis, optimize=True)  # (joints, r, r)
     inflation = _inflation(moments, parameters, basis, values[seen], white, variance)
@@ -42,7 +44,7 @@ def block_covariance(moments: Moments, parameters: Array, weights: Array) -> Arr
     unseen = ~live | (1.0 - np.einsum("mr,mr->m", vectors[:, seen], vectors[:, seen]) > LEVERAGE_TOLERANCE)
     covariance[unseen, :] = covariance[:, unseen] = 0.0
     covariance[unseen, unseen] = np.inf
-    return covariance
+    return np.asarray(covariance)
 
 
 def _inflation(
@@ -56,4 +58,4 @@ def _inflation(
     scores = scores - scores.mean(axis=0)
     energy = np.einsum("bjr,r->j", scores**2, 1.0 / values) * moments.blocks / (moments.blocks - 1)
     expected = variance * np.einsum("jrr,r->j", white, 1.0 / values)
-    return np.maximum(energy / np.where(expected > 0.0, expected, np.inf), 1.0)
+    return np.asarray(np.maximum(energy / np.where(expected > 0.0, expected, np.inf), 1.0))

@@ -14,7 +14,7 @@ from casysid.estimation.cross_validation import cross_validate
 from casysid.estimation.standardise import StandardisedProblem, seen_directions, standardise
 from casysid.moments import Moments, NormalEquations
 
-STRENGTHS = tuple(np.geomspace(1e-8, 1e1, 28).tolist())
+STRENGTHS: tuple[float, ...] = tuple(np.geomspace(1e-8, 1e1, 28).tolist())
 
 
 @dataclass(frozen=True)

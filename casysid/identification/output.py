@@ -11,7 +11,9 @@ from casysid.identification.verdict import judge
 from casysid.robot import write_robot
 
 
-def write_result(result: IdentificationResult, directory: Path, *, export_inconsistent: bool = False) -> tuple[str, ...]:
+def write_result(
+    result: IdentificationResult, directory: Path, *, export_inconsistent: bool = False
+) -> tuple[str, ...]:
     """Write ``result.json`` and ``identified.urdf`` or ``identified.xml`` into a directory, made if needed.
 
     Returns:

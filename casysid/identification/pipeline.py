@@ -5,11 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
+from casysid.arrays import Array
 from casysid.errors import RecordingError
 from casysid.identifiability import excited_base_parameters, structural_base_parameters
-from casysid.identification.cutoff import choose_cutoff
+from casysid.identification.coulomb import choose_relative_width
+from casysid.identification.cutoff import COARSE_STEP, FINE_STEP, CutoffChoice, choose_cutoff
 from casysid.identification.prediction import torque_error
-from casysid.identification.problem import build_problem
+from casysid.identification.problem import USUAL_WIDTH, build_problem
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 from casysid.recording import Recording
@@ -49,10 +53,10 @@ def identify(
     if not fitted:
         raise RecordingError("identify: at least one recording to fit is needed; got none")
     clock = _Clock()
-    cutoff = choose_cutoff(robot, fitted, settings, lambda share: progress("cut-off", share))
-    clock.lap("cut-off")
+    cutoff, width = _settle(robot, fitted, settings, progress)
+    clock.lap("tuning")
     progress("moments", 0.0)
-    problem = build_problem(robot, fitted, cutoff.cutoff, settings)
+    problem = build_problem(robot, fitted, cutoff.cutoff, settings, relative_width=width)
     clock.lap("moments")
     progress("estimate", 0.0)
     regressor = problem.regressor
@@ -84,6 +88,31 @@ def identify(
         held_out_motions=held_out_motions,
         seconds=clock.laps,
     )
+
+
+def _settle(
+    robot: Robot, recordings: Sequence[Recording], settings: Settings, progress: Progress
+) -> tuple[CutoffChoice, Array]:
+    """Cut-off and sharpness of Coulomb friction, each chosen given the other; first roughly, then finely."""
+    width: float | Array = USUAL_WIDTH
+    for step in (COARSE_STEP, FINE_STEP):
+        pace = "rough" if step == COARSE_STEP else "fine"
+        cutoff = choose_cutoff(
+            robot,
+            recordings,
+            settings,
+            relative_width=width,
+            step=step,
+            progress=lambda share, pace=pace: progress(f"cut-off, {pace}", share),  # type: ignore[misc]
+        )
+        width = choose_relative_width(
+            robot,
+            recordings,
+            cutoff.cutoff,
+            settings,
+            lambda share, pace=pace: progress(f"friction, {pace}", share),  # type: ignore[misc]
+        )
+    return cutoff, np.broadcast_to(width, robot.nv)
 
 
 class _Clock:

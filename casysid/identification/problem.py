@@ -10,7 +10,7 @@ import numpy as np
 
 from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
-from casysid.dynamics import Column, Coulomb, Regressor, build_regressor
+from casysid.dynamics import Coulomb, Regressor, build_regressor
 from casysid.identification.settings import Settings
 from casysid.moments import Moments
 from casysid.recording import Recording
@@ -18,9 +18,9 @@ from casysid.robot import Robot
 from casysid.signals import Motion, motion_from_recording
 
 WIDTH_IN_NOISE = 3.0
-"""The smooth sign of Coulomb friction turns within this many standard deviations of the velocity's noise."""
-SMALLEST_WIDTH = 1e-4
-"""And within no less than this fraction of the root mean square velocity."""
+"""The smooth sign of Coulomb friction turns within no less than this many standard deviations of the velocity's noise."""
+USUAL_WIDTH = 5e-3
+"""And, before the data have chosen, within this fraction of the root mean square velocity."""
 MINIMUM_BLOCKS = 4
 
 
@@ -40,11 +40,31 @@ class LinearProblem:
 
 
 def build_problem(
-    robot: Robot, recordings: Sequence[Recording], cutoff: float | None, settings: Settings, *, rows: int | None = None
+    robot: Robot,
+    recordings: Sequence[Recording],
+    cutoff: float | None,
+    settings: Settings,
+    *,
+    relative_width: float | Array = USUAL_WIDTH,
+    rows: int | None = None,
 ) -> LinearProblem:
-    """Smooth, differentiate, and sum up; at most about ``rows`` samples of each recording when given."""
+    """Smooth, differentiate, and sum up.
+
+    Args:
+        robot: The robot.
+        recordings: At least one.
+        cutoff: Of the low-pass [Hz]; None takes the samples as logged.
+        settings: Friction columns, couplings, blocks, threads.
+        relative_width: Of Coulomb's smooth sign, in root mean square velocities; one for all or by degree of freedom.
+        rows: Take at most about this many samples of each recording.
+    """
     motions = tuple(_thinned(motion_from_recording(robot, recording, cutoff), rows) for recording in recordings)
-    regressor = build_regressor(robot, friction=with_widths(settings.friction, motions), couplings=settings.couplings)
+    width = settings.coulomb_width or tuple(coulomb_width(motions, relative_width).tolist())
+    friction = tuple(
+        dataclasses.replace(column, width=width) if isinstance(column, Coulomb) else column
+        for column in settings.friction
+    )
+    regressor = build_regressor(robot, friction=friction, couplings=settings.couplings)
     return LinearProblem(regressor, motions, sum_moments(regressor, motions, settings))
 
 
@@ -52,9 +72,7 @@ def sum_moments(regressor: Regressor, motions: Sequence[Motion], settings: Setti
     """Moments of all motions, their blocks one after the other."""
     blocks = max(MINIMUM_BLOCKS, -(-settings.blocks // len(motions)))
     parts = [
-        accumulate_moments(
-            regressor, motion.q, motion.v, motion.a, motion.tau, blocks=blocks, threads=settings.threads
-        )
+        accumulate_moments(regressor, motion.q, motion.v, motion.a, motion.tau, blocks=blocks, threads=settings.threads)
         for motion in motions
     ]
     total = parts[0]
@@ -63,20 +81,11 @@ def sum_moments(regressor: Regressor, motions: Sequence[Motion], settings: Setti
     return total
 
 
-def with_widths(friction: Sequence[Column], motions: Sequence[Motion]) -> tuple[Column, ...]:
-    """The friction columns, Coulomb's smooth sign as narrow as the noise of these motions' velocities allows."""
-    width = coulomb_width(motions)
-    return tuple(
-        dataclasses.replace(column, width=width) if isinstance(column, Coulomb) and column.width is None else column
-        for column in friction
-    )
-
-
-def coulomb_width(motions: Sequence[Motion]) -> Array:
-    """Velocity within which the sign of each degree of freedom's velocity is not certain, shape (nv,)."""
+def coulomb_width(motions: Sequence[Motion], relative_width: float | Array) -> Array:
+    """Velocity within which the sign of each degree of freedom's velocity turns, shape (nv,): never sharper than its noise."""
     noise = np.max([motion.velocity_noise for motion in motions], axis=0)
     speed = np.sqrt(np.mean([np.mean(motion.v**2, axis=0) for motion in motions], axis=0))
-    return np.maximum(np.maximum(WIDTH_IN_NOISE * noise, SMALLEST_WIDTH * speed), 1e-9)
+    return np.asarray(np.maximum(np.maximum(WIDTH_IN_NOISE * noise, relative_width * speed), 1e-9))
 
 
 def _thinned(motion: Motion, rows: int | None) -> Motion:

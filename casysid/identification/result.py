@@ -80,10 +80,11 @@ class IdentificationResult:
     @property
     def negative_drive_parameters(self) -> tuple[str, ...]:
         """Names of friction and armature parameters that ought not to be negative, and are."""
+        inertial = 10 * len(self.robot.links)
         return tuple(
             parameter.name
-            for parameter, value in zip(self.regressor.parameters, self.parameters, strict=True)
-            if parameter.non_negative and value < 0.0 and parameter.kind != "m"
+            for parameter, value in zip(self.regressor.parameters[inertial:], self.parameters[inertial:], strict=True)
+            if parameter.non_negative and value < 0.0
         )
 
     @property
@@ -113,9 +114,9 @@ class IdentificationResult:
     def drive_parameters(self) -> dict[str, dict[str, float | None]]:
         """Friction and armature by degree of freedom; None for a kind that is not in the model. Couplings go by their name."""
         table: dict[str, dict[str, float | None]] = {dof: dict.fromkeys(JOINT_KINDS) for dof in self.robot.dofs}
-        for parameter, value in zip(self.regressor.parameters, self.parameters, strict=True):
-            if parameter.owner not in self.robot.links or parameter.kind in JOINT_KINDS:
-                table.setdefault(parameter.owner, {})[parameter.kind] = float(value)
+        inertial = 10 * len(self.robot.links)
+        for parameter, value in zip(self.regressor.parameters[inertial:], self.parameters[inertial:], strict=True):
+            table.setdefault(parameter.owner, {})[parameter.kind] = float(value)
         return table
 
     def drive_vector(self, kind: str) -> Array:
@@ -134,7 +135,11 @@ class IdentificationResult:
             "joints": list(by_joint),
             "samples": {"train": self.train.samples, "held_out": held_out.samples if held_out else 0},
             "seconds": round(sum(self.seconds.values()), 3),
-            "cutoff": {"hz": self.cutoff.cutoff, "motion_band_hz": self.cutoff.motion_band, "reason": self.cutoff.reason},
+            "cutoff": {
+                "hz": self.cutoff.cutoff,
+                "motion_band_hz": self.cutoff.motion_band,
+                "reason": self.cutoff.reason,
+            },
             "relative_error": {
                 "train": self.train.relative,
                 "held_out": held_out.relative if held_out else None,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from casysid.dynamics import DEFAULT_FRICTION, Column, Coupling
+from casysid.dynamics import DEFAULT_FRICTION, Coupling, FrictionColumn
 from casysid.errors import ParameterError
 from casysid.estimation import Estimator, Ridge
 from casysid.inertia import Consistency
@@ -21,6 +21,7 @@ class Settings:
         consistency: Physical laws that the parameters are made to obey; None leaves the estimate as it is.
         cutoff: Low-pass cut-off [Hz]; None lets the data choose.
         friction: Kinds of friction and drive columns of every joint.
+        coulomb_width: Velocity within which Coulomb's smooth sign turns [rad/s, m/s]; None takes it from the velocity's noise.
         couplings: Transmissions that link joints, such as a wrist driven by two motors.
         blocks: Blocks of time by which moments are kept: the folds of cross-validation and the unit of standard errors.
         threads: Threads of the regressor's evaluation.
@@ -29,7 +30,8 @@ class Settings:
     method: Estimator = field(default_factory=Ridge)
     consistency: Consistency | None = None
     cutoff: float | None = None
-    friction: tuple[Column, ...] = DEFAULT_FRICTION
+    friction: tuple[FrictionColumn, ...] = DEFAULT_FRICTION
+    coulomb_width: float | None = None
     couplings: tuple[Coupling, ...] = ()
     blocks: int = 20
     threads: int = 2
@@ -38,6 +40,8 @@ class Settings:
         if self.cutoff is not None and not (np.isfinite(self.cutoff) and self.cutoff > 0):
             raise ParameterError(f"cut-off must be a positive number of Hz; got {self.cutoff}")
         if self.blocks < 4:
-            raise ParameterError(f"blocks must be at least 4 for cross-validation and standard errors; got {self.blocks}")
+            raise ParameterError(
+                f"blocks must be at least 4 for cross-validation and standard errors; got {self.blocks}"
+            )
         if self.threads < 1:
             raise ParameterError(f"threads must be at least 1; got {self.threads}")

@@ -67,7 +67,9 @@ def _remarks(result: IdentificationResult) -> list[str]:
             "the model file's values. Move the joints more, and differently."
         )
     if result.excited.condition_number > 1000.0:
-        remarks.append(f"The recordings excite weakly: condition number {result.excited.condition_number:.0f} (below 100 is good).")
+        remarks.append(
+            f"The recordings excite weakly: condition number {result.excited.condition_number:.0f} (below 100 is good)."
+        )
     still = [
         dof
         for k, dof in enumerate(result.robot.dofs)

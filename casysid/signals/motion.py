@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from casysid.arrays import Array, frozen
+from casysid.errors import RecordingError
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.robot.coordinates import configuration_from_channels, state_from_channels
@@ -80,10 +81,13 @@ def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | No
 
 def _as_logged(robot: Robot, recording: Recording) -> Motion:
     if recording.velocity is None or recording.acceleration is None:
-        raise ValueError("a recording can be taken as logged only when it carries velocity and acceleration")
+        raise RecordingError(
+            f"{recording.label}: samples without a low-pass need velocity and acceleration in the log; add v_ and a_ columns, "
+            "or time stamps so that they can be differentiated"
+        )
     count = len(recording.torque)
     return Motion(
-        time=np.arange(count) if recording.time is None else recording.time,
+        time=np.arange(count, dtype=np.float64) if recording.time is None else recording.time,
         q=configuration_from_channels(robot, recording.position),
         v=recording.velocity,
         a=recording.acceleration,

@@ -32,20 +32,20 @@ def motion_band(time: Array, position: Array, share: float = 0.99) -> Array:
     moving = motion[: max(len(motion) // 2, 1)]
     total = np.cumsum(moving, axis=0)
     reached = np.argmax(total >= share * total[-1], axis=0)
-    return np.where(total[-1] > 0, frequency[reached], 0.0)
+    return np.asarray(np.where(total[-1] > 0, frequency[reached], 0.0))
 
 
 def position_noise(time: Array, position: Array) -> Array:
     """Standard deviation of position noise by channel, shape (n,), in the channel's unit.
 
-    White noise is read from the upper half of the spectrum, where no motion is: the median of an exponentially distributed
-    periodogram is ``ln 2`` times its mean. A quantised sensor adds at least its step over √12 (Widrow 1956), which a slow motion
+    White noise is read from the upper half of the spectrum, where no motion is: the median of an exponentially
+    distributed periodogram is ``ln 2`` times its mean. A quantised sensor adds at least its step over √12 (Widrow 1956), which a slow motion
     shows at low frequencies only.
     """
     even, rate = _even_samples(time, position)
     _, power = periodogram(even, rate, window="hann", detrend="linear", axis=0)
     floor = np.median(power[len(power) // 2 :], axis=0) / np.log(2.0)
-    return np.maximum(np.sqrt(floor * rate / 2.0), position_resolution(position) / np.sqrt(12.0))
+    return np.asarray(np.maximum(np.sqrt(floor * rate / 2.0), position_resolution(position) / np.sqrt(12.0)))
 
 
 def position_resolution(position: Array) -> Array:

@@ -1,0 +1,48 @@
+"""How sharply Coulomb friction changes its sign, settled by the data.
+
+A step at zero velocity fits a stiff drive; a lubricated or elastic one changes over a band of slow motion. The width of the smooth
+sign enters nonlinearly, so a few widths are tried, each a whole small identification, and every joint takes the one that predicts
+its own torque best on blocks of time left out. All joints share a trial, because a joint's width acts on its own torque alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from casysid.arrays import Array
+from casysid.dynamics import Coulomb
+from casysid.estimation import Ridge, cross_validated_energy
+from casysid.identification.cutoff import CANDIDATE_ROWS
+from casysid.identification.problem import USUAL_WIDTH, build_problem
+from casysid.identification.settings import Settings
+from casysid.recording import Recording
+from casysid.robot import Robot
+
+RELATIVE_WIDTHS = (3e-4, 1.5e-3, USUAL_WIDTH, 2e-2, 6e-2)
+"""Candidates, in root mean square velocities of the joint."""
+WORTHWHILE_GAIN = 0.03
+"""The sharpest width is taken whose error is within this share of the best: a step is the model, a slope needs evidence."""
+
+
+def choose_relative_width(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    cutoff: float | None,
+    settings: Settings,
+    progress: Callable[[float], None] = lambda share: None,
+) -> Array:
+    """Width of each degree of freedom's smooth sign, in root mean square velocities, shape (nv,)."""
+    if settings.coulomb_width is not None or not any(isinstance(column, Coulomb) for column in settings.friction):
+        return np.full(robot.nv, USUAL_WIDTH)
+    energy = []
+    for k, width in enumerate(RELATIVE_WIDTHS):
+        problem = build_problem(
+            robot, recordings, cutoff, settings, relative_width=width, rows=max(CANDIDATE_ROWS // len(recordings), 500)
+        )
+        energy.append(cross_validated_energy(Ridge(), problem.moments, problem.regressor.prior))
+        progress((k + 1) / len(RELATIVE_WIDTHS))
+    error = np.sqrt(energy)  # (widths, nv)
+    good_enough = error <= (1.0 + WORTHWHILE_GAIN) * error.min(axis=0)
+    return np.asarray(np.array(RELATIVE_WIDTHS)[np.argmax(good_enough, axis=0)])
