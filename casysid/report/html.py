@@ -84,5 +84,7 @@ def _sections(result: IdentificationResult) -> list[Section]:
         ),
     ]
     if len(result.cutoff.candidates):
-        sections.append(Section("Choice of the low-pass", result.cutoff.reason, picture=inline_png(cutoff_figure(result))))
+        sections.append(
+            Section("Choice of the low-pass", result.cutoff.reason, picture=inline_png(cutoff_figure(result)))
+        )
     return sections

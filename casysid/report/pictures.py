@@ -52,7 +52,11 @@ def torque_figure(result: IdentificationResult) -> Any:
 def torque_unit(result: IdentificationResult, dof: int) -> str:
     """Unit of a degree of freedom's torque: that of its offset column."""
     name = result.robot.dofs[dof]
-    units = [one.unit for one in result.regressor.parameters if (one.owner, one.kind) in ((name, "offset"), (name, "coulomb"))]
+    units = [
+        one.unit
+        for one in result.regressor.parameters
+        if (one.owner, one.kind) in ((name, "offset"), (name, "coulomb"))
+    ]
     return units[0] if units else "N m"
 
 

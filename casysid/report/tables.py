@@ -38,7 +38,13 @@ def error_table(result: IdentificationResult) -> Table:
     """Relative torque error overall and by joint: fitted, held out, and of the file's own parameters."""
     held_out, train, file = result.held_out, result.train, result.file
     rows = [
-        ("all joints", percent(train.relative), percent(held_out.relative if held_out else None), percent(file.relative), ""),
+        (
+            "all joints",
+            percent(train.relative),
+            percent(held_out.relative if held_out else None),
+            percent(file.relative),
+            "",
+        ),
         (
             "… unfiltered torque",
             percent(train.relative_unfiltered),
@@ -66,7 +72,9 @@ def link_table(result: IdentificationResult) -> Table:
     for link in result.links():
         centre = ", ".join(number(float(value), 3) for value in link.center_of_mass)
         diagonal = ", ".join(number(float(value), 3) for value in link.inertia[:3])
-        rows.append((link.name, number(link.mass), number(link.mass_std, 2), centre, diagonal, link.identifiable[0].value))
+        rows.append(
+            (link.name, number(link.mass), number(link.mass_std, 2), centre, diagonal, link.identifiable[0].value)
+        )
     header = ("link", "mass [kg]", "± std", "centre of mass [m]", "Ixx, Iyy, Izz at it [kg m²]", "mass identifiable")
     return Table(header, tuple(rows))
 

@@ -1,0 +1,136 @@
+"""Held-out torque error on logs of real robots, every method with its defaults, as a table and as JSON.
+
+    python scripts/evaluate_real_robots.py --data DIR [--methods ols,wls,ridge] [--robots emps,...] [--json FILE]
+
+DIR holds a folder per robot with its URDF and recordings. What is known of a robot beforehand, such as a wrist whose motors drive
+two joints, is declared in the table below; nothing else is told.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from casysid.dynamics import Coupling
+from casysid.estimation import estimator_by_name
+from casysid.identification import IdentificationResult, Settings, identify
+from casysid.inertia import Consistency
+from casysid.recording import read_recording
+from casysid.robot import Robot
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A robot's fitted and held-out recordings; without the latter, the last 40 % of time is held out."""
+
+    folder: str
+    urdf: str
+    fitted: tuple[str, ...]
+    held_out: tuple[str, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    anchor: float = float("nan")
+
+
+def pendulum(*stamps: str) -> tuple[str, ...]:
+    return tuple(f"design_C1_{stamp}" for stamp in stamps)
+
+
+TRIALS = (
+    Trial("emps", "emps.urdf", ("estimation",), ("validation_pulses",), anchor=0.074),
+    Trial(
+        "staubli_tx40",
+        "tx40.urdf",
+        ("excitation_9s_joint",),
+        couplings=(Coupling(joints=("joint_5", "joint_6"), weights=(1.0, 1.0)),),
+        anchor=0.124,
+    ),
+    Trial("kuka_iiwa14_lasa", "iiwa14.urdf", ("motion_30s",), anchor=0.025),
+    Trial("rokae_xmate3pro", "xmate3pro.urdf", ("excitation_20s",), anchor=0.042),
+    Trial("airbot_play", "airbot_play.urdf", ("chirp",), ("trapezoid",), anchor=0.077),
+    Trial("kuka_kr300", "kuka_kr300.urdf", ("traj_A", "traj_B"), ("traj_C",), anchor=0.160),
+    Trial("kuka_med7_slow", "med7.urdf", ("measurements",), anchor=0.204),
+    Trial(
+        "dfki_double_pendulum",
+        "design_C1.urdf",
+        pendulum("143339", "143601", "143747", "144003", "154220"),
+        pendulum("143524", "143704", "143906", "144115", "154548"),
+        anchor=0.404,
+    ),
+)
+
+
+def run_trial(data: Path, trial: Trial, settings: Settings) -> IdentificationResult:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        robot = Robot.from_file(data / trial.folder / trial.urdf)
+        fitted, held_out = (
+            [read_recording(data / trial.folder / f"{name}.csv.gz", robot) for name in names]
+            for names in (trial.fitted, trial.held_out)
+        )
+        if not held_out:
+            (whole,) = fitted
+            first, second = whole.split(0.6)
+            fitted, held_out = [first], [second]
+        return identify(robot, fitted, settings, held_out=held_out)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    parser.add_argument("--methods", default="ols,wls,ridge")
+    parser.add_argument("--consistency", choices=["none", "inertia", "full"], default="none")
+    parser.add_argument("--robots", default=",".join(trial.folder for trial in TRIALS))
+    parser.add_argument("--json", type=Path)
+    arguments = parser.parse_args()
+    methods, chosen = arguments.methods.split(","), arguments.robots.split(",")
+    consistency = None if arguments.consistency == "none" else Consistency(arguments.consistency)
+    console, figures = Console(), {}
+    table = Table(title=f"held-out relative torque error, consistency {arguments.consistency}")
+    for header in ("robot", "plain WLS, tuned", "cut-off [Hz]", *methods, "best / plain", "model file", "seconds"):
+        table.add_column(header, justify="left" if header == "robot" else "right")
+    for trial in track([one for one in TRIALS if one.folder in chosen], console=Console(stderr=True), transient=True):
+        started = time.perf_counter()
+        results = {}
+        cutoff = None
+        for name in methods:
+            settings = Settings(
+                method=estimator_by_name(name), consistency=consistency, couplings=trial.couplings, cutoff=cutoff
+            )
+            results[name] = run_trial(arguments.data, trial, settings)
+            cutoff = results[name].cutoff.cutoff
+        seconds = time.perf_counter() - started
+        errors = {name: result.held_out.relative for name, result in results.items()}
+        best, any_result = min(errors.values()), next(iter(results.values()))
+        figures[trial.folder] = {
+            "anchor": trial.anchor,
+            "cutoff": cutoff,
+            "held_out": errors,
+            "unfiltered": {name: result.held_out.relative_unfiltered for name, result in results.items()},
+            "consistent": {name: result.is_physically_consistent for name, result in results.items()},
+            "file": any_result.file.relative,
+            "seconds": seconds,
+        }
+        table.add_row(
+            trial.folder,
+            f"{trial.anchor:.3f}",
+            f"{cutoff:.3g}",
+            *(f"{error:.4f}" for error in errors.values()),
+            f"{best / trial.anchor:.2f}",
+            f"{any_result.file.relative:.3f}",
+            f"{seconds:.1f}",
+        )
+    console.print(table)
+    if arguments.json:
+        arguments.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

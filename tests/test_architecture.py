@@ -1,0 +1,92 @@
+"""The house stands: imports go one way, heavy packages stay in their rooms, files keep to one purpose."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "casysid"
+ORDER = (
+    ("errors", "arrays"),
+    ("nlp", "inertia"),
+    ("robot", "bundled"),
+    ("recording", "readers", "dynamics"),
+    ("signals", "moments", "accumulation"),
+    ("identifiability",),
+    ("estimation", "projection", "excitation"),
+    ("identification",),
+    ("simulation",),
+    ("validation",),
+    ("report",),
+    ("cli",),
+)
+LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+
+def room_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imported_modules(path: Path) -> set[str]:
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+    return names
+
+
+@pytest.mark.parametrize(
+    "path", [path for path in FILES if room_of(path) != "__init__"], ids=lambda path: str(path.relative_to(PACKAGE))
+)
+def test_imports_go_one_way(path):
+    own = LEVEL[room_of(path)]
+    for module in imported_modules(path):
+        parts = module.split(".")
+        if parts[0] == "casysid" and len(parts) > 1:
+            assert LEVEL[parts[1]] <= own, f"{path.name} imports {module}, which comes after it"
+
+
+@pytest.mark.parametrize(
+    ("package", "rooms"),
+    [
+        ("mujoco", {"robot", "simulation"}),
+        ("matplotlib", {"report"}),
+        ("rich", {"cli"}),
+        ("typer", {"cli"}),
+        ("clarabel", {"projection"}),
+        ("sklearn", {"estimation"}),
+        ("pyarrow", {"readers"}),
+    ],
+)
+def test_heavy_packages_stay_in_their_rooms(package, rooms):
+    users = {room_of(path) for path in FILES if any(name.split(".")[0] == package for name in imported_modules(path))}
+    assert users <= rooms
+
+
+def test_ipopt_is_called_in_one_place():
+    assert {room_of(path) for path in FILES if "nlpsol(" in path.read_text()} <= {"nlp"}
+
+
+def test_every_public_name_exists_and_is_documented():
+    import casysid
+
+    assert casysid.__all__ == sorted(casysid.__all__)
+    for name in casysid.__all__:
+        assert getattr(casysid, name).__doc__, name
+
+
+def test_importing_the_command_line_loads_nothing_heavy():
+    heavy = "casadi pinocchio mujoco scipy sklearn matplotlib pyarrow".split()
+    code = f"import sys, casysid, casysid.cli; print([name for name in {heavy} if name in sys.modules])"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_no_file_outgrows_its_purpose(path):
+    assert len(path.read_text().splitlines()) <= 400
