@@ -1,12 +1,7 @@
-"""Writes MJCF: the text that came in, with other numbers.
-
-Bodies and joints are found by their order in the text, which is MuJoCo's. Where the text does not hold them all
-(includes, replicas, attached models), MuJoCo's own flattened text is taken, which is exact when saved as authored.
-"""
+"""Writes MJCF: the text that came in, with other numbers."""
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +14,11 @@ from casysid.inertia import MassProperties, inertial_parameters
 from casysid.robot.lumping import joint_parts, share_out
 from casysid.robot.mjcf import compile_mjcf
 from casysid.robot.mjcf_actuators import actuator_reflection
+from casysid.robot.mjcf_text import joint_elements, locate_bodies, own_elements
 from casysid.robot.mjcf_tree import body_names, joint_names
 from casysid.robot.model import Joint, Robot
 from casysid.robot.xmlpatch import XmlPatch, comment, element_text, number_text, path_from
-from casysid.robot.xmltext import Element, parse_xml, read_bytes
+from casysid.robot.xmltext import Element, read_bytes
 
 _NEUTRAL = {  # compiler settings that would change a stated inertia, and what they are set to
     "inertiafromgeom": "auto",
@@ -32,6 +28,7 @@ _NEUTRAL = {  # compiler settings that would change a stated inertia, and what t
     "settotalmass": None,
 }
 _ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler", "diaginertia")
+_ONE_FILE = "written as one file: what was included, attached or replicated stands in it"
 _MASSLESS = {"pos": "0 0 0", "mass": "0", "diaginertia": "0 0 0"}
 
 
@@ -43,18 +40,9 @@ def mjcf_text(robot: Robot, folder: Path) -> tuple[bytes, list[str]]:
     """
     spec, compiled, _ = compile_mjcf(robot.source)
     _refuse_aligned_bodies(spec, robot.source)
-    text, notes = read_bytes(robot.source), []
-    root = parse_xml(text, robot.source)
-    elements = _locate_bodies(root, compiled)
     moved = robot.source.parent.resolve() != folder.resolve()
-    includes = any(element.tag == "include" for element in root.walk())
-    if elements is None or (includes and (moved or _adjusts_inertia(spec))):
-        text = _flattened(spec, robot.source)
-        root = parse_xml(text, robot.source)
-        elements = _locate_bodies(root, compiled)
-        notes.append("written as one file: what was included, attached or replicated stands in it")
-    if elements is None:
-        raise RobotError(f"{robot.source}: cannot tell which <body> is which; write the bodies out in one file")
+    text, root, elements = locate_bodies(robot.source, spec, compiled, alone=moved or _adjusts_inertia(spec))
+    notes = [] if text == read_bytes(robot.source) else [_ONE_FILE]
     patch = XmlPatch(text)
     notes += _patch_inertials(patch, robot, compiled, elements, everywhere=_adjusts_inertia(spec))
     notes += _patch_joints(patch, robot, spec, compiled, elements)
@@ -80,48 +68,6 @@ def _refuse_aligned_bodies(spec: Any, source: Path) -> None:
                 f"{source}: the frame of body '{joint.parent.name}' follows its inertia (alignfree), so the log "
                 "would mean another motion with the new one; set alignfree to false"
             )
-
-
-def _flattened(spec: Any, source: Path) -> bytes:
-    """MuJoCo's text of the whole model, as authored.
-
-    Raises:
-        RobotError: An asset's file is missing.
-    """
-    spec.compiler.savecompiled = spec.compiler.savecanonical = False
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the same as when it was read
-            return str(spec.to_xml()).encode()
-    except ValueError as error:
-        raise RobotError(f"{source}: MuJoCo cannot write the included parts: {' '.join(str(error).split())}") from error
-
-
-def _own(body: Element, tags: tuple[str, ...]) -> list[Element]:
-    """Elements of a body, and of frames in it, but not of bodies in it."""
-    found: list[Element] = []
-    for child in body.children:
-        if child.tag in tags:
-            found.append(child)
-        elif child.tag == "frame":
-            found += _own(child, tags)
-    return found
-
-
-def _joint_elements(body: Element) -> list[Element]:
-    return _own(body, ("joint", "freejoint"))
-
-
-def _locate_bodies(root: Element, compiled: Any) -> list[Element] | None:
-    """The element of each body but the world, in MuJoCo's order; None if the text does not show them all."""
-    elements = [e for world in root.find_all("worldbody") for e in world.walk() if e.tag == "body"]
-    if len(elements) != compiled.nbody - 1:
-        return None
-    for b, element in enumerate(elements, 1):
-        names = [compiled.joint(j).name for j in range(compiled.njnt) if compiled.jnt_bodyid[j] == b]
-        if element.name != compiled.body(b).name or [joint.name for joint in _joint_elements(element)] != names:
-            return None
-    return elements
 
 
 def _patch_inertials(
@@ -169,7 +115,7 @@ def _patch_inertial(patch: XmlPatch, body: Element, share: MassProperties | None
             "mass": number_text([float(share.mass)]),
             "fullinertia": number_text(entries),
         }
-    present = _own(body, ("inertial",))
+    present = own_elements(body, "inertial")
     for inertial in present:
         if inertial.parent is body:
             unset = {name: None for name in (*_ORIENTATIONS, "fullinertia") if name in inertial.attributes}
@@ -183,8 +129,8 @@ def _patch_joints(patch: XmlPatch, robot: Robot, spec: Any, compiled: Any, eleme
     """Armature, damping and dry friction where they differ from the file's."""
     names, notes = joint_names(compiled), []
     armature, damping = actuator_reflection(compiled)
-    places = {joint.name: joint for joint in robot.joints}
-    of_body = {b: _joint_elements(element) for b, element in enumerate(elements, 1)}
+    places, authored = {joint.name: joint for joint in robot.joints}, {joint.id: joint for joint in spec.joints}
+    of_body = {b: joint_elements(element) for b, element in enumerate(elements, 1)}
     for j, name in enumerate(names):
         if name not in places:
             continue
@@ -196,9 +142,9 @@ def _patch_joints(patch: XmlPatch, robot: Robot, spec: Any, compiled: Any, eleme
             "damping": (robot.damping[joint.v] - damping[dofs], compiled.dof_damping[dofs]),
             "frictionloss": (robot.dry_friction[joint.v], compiled.dof_frictionloss[dofs]),
         }
-        sprung = bool((spec.joints[j].springdamper > 0).all())
+        sprung = bool((authored[j].springdamper > 0).all())
         for attribute, (values, present) in wanted.items():
-            if not np.allclose(values, present, rtol=1e-15, atol=0.0) or (sprung and attribute == "damping"):
+            if not np.allclose(values, present, rtol=1e-12, atol=0.0) or (sprung and attribute == "damping"):
                 higher = compiled.dof_dampingpoly[first] if attribute == "damping" else np.zeros(2)
                 notes += _patch_joint(patch, element, joint, attribute, values, higher)
         if sprung:  # it would overrule the damping
@@ -216,7 +162,7 @@ def _patch_joint(
     if np.ptp(values):
         return [f"joint '{joint.name}': MJCF has one {attribute} for all directions, the mean of {number_text(values)}"]
     if values[0] < 0.0:
-        return [f"joint '{joint.name}': {attribute} is negative, beside what its actuators add"]
+        return [f"joint '{joint.name}': its own {attribute} is negative ({values[0]:g}), its actuators may add to it"]
     return []
 
 

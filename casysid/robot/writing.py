@@ -68,14 +68,7 @@ def write_robot(
         raise RobotError(
             f"robot '{robot.name}': its file {robot.source} is not there; only robots read from a file are written"
         )
-    if robot.source_format == "urdf":
-        from casysid.robot.write_urdf import urdf_text
-
-        text, notes = urdf_text(wanted, path.parent)
-    else:
-        from casysid.robot.write_mjcf import mjcf_text
-
-        text, notes = mjcf_text(wanted, path.parent)
+    text, notes = _text_of(wanted, path.parent)
     impossible = [
         f"link '{link}': its parameters are not those of a body; simulators may refuse the file"
         for link, theta in zip(wanted.links, wanted.inertial_parameters.reshape(-1, 10), strict=True)
@@ -92,6 +85,16 @@ def write_robot(
     finally:
         draft.unlink(missing_ok=True)
     return WrittenModel(path, (*notes, *impossible))
+
+
+def _text_of(robot: Robot, folder: Path) -> tuple[bytes, list[str]]:
+    if robot.source_format == "urdf":
+        from casysid.robot.write_urdf import urdf_text
+
+        return urdf_text(robot, folder)
+    from casysid.robot.write_mjcf import mjcf_text
+
+    return mjcf_text(robot, folder)
 
 
 def _read_back(robot: Robot, path: Path) -> Robot:

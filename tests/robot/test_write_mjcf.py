@@ -142,7 +142,7 @@ def test_an_inertia_in_a_frame_moves_to_its_body(tmp_path):
 def test_what_actuators_add_is_not_counted_twice(tmp_path):
     robot = robot_of(tmp_path, CASES["geared motors"])
     written = write_robot(robot, tmp_path / "new.xml", np.tile(BODY, 2), armature=[0.01, 0.2], damping=[1.0, 1.0])
-    assert written.notes == ("joint 'j1': armature is negative, beside what its actuators add",)
+    assert written.notes == ("joint 'j1': its own armature is negative (-0.08), its actuators may add to it",)
     again = reads_back(written, np.tile(BODY, 2))
     np.testing.assert_allclose(again.armature, [0.01, 0.2], rtol=1e-14)
     np.testing.assert_allclose(again.damping, [1.0, 1.0], rtol=1e-14)
