@@ -1,8 +1,8 @@
 """Write the bundled robot models: URDF, MJCF and README, all from one table per robot in ``model_tables/``.
 
 A link's inertia is that of the solids it is drawn with, each of uniform density: what the picture shows is what the
-joints feel. One table writes both formats, so they cannot disagree. Run ``python scripts/make_models.py`` after editing a
-table, then ``python scripts/render_models.py`` for the pictures.
+joints feel. One table writes both formats, so they cannot disagree. Run ``python scripts/make_models.py`` after editing
+a table, then ``python scripts/render_models.py`` for the pictures.
 """
 
 from __future__ import annotations

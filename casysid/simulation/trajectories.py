@@ -52,11 +52,7 @@ class Sinusoids:
     def __post_init__(self) -> None:
         for name in ("center", "amplitude", "frequency", "phase", "axes"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        if not 0.0 < 2.0 * self.ramp <= self.duration < np.inf:
-            raise ParameterError(
-                "sinusoids: the ramp must be positive and fit twice into the duration; "
-                f"got ramp {self.ramp} s, duration {self.duration} s"
-            )
+        _check_ramp(self.ramp, self.duration)
 
     def sample(self, time: Array) -> Reference:
         """The motion at times (N,), [s]."""
@@ -137,6 +133,7 @@ def design_sinusoids(
         ParameterError: A setting is out of range.
     """
     shares = (range_share, velocity_share, torque_share)
+    _check_ramp(ramp, duration)
     if components < 1 or not 0.0 < band[0] <= band[1] or not all(0.0 < share <= 1.0 for share in shares):
         raise ParameterError(
             "sinusoids: wanted at least one component, a band of positive rising frequencies, shares above 0 up to 1; "
@@ -186,6 +183,14 @@ def _within_torque(motion: Sinusoids, share: float) -> Sinusoids:
         stacklevel=3,
     )
     return motion
+
+
+def _check_ramp(ramp: float, duration: float) -> None:
+    if not 0.0 < 2.0 * ramp <= duration < np.inf:
+        raise ParameterError(
+            "sinusoids: the ramp must be positive and fit twice into the duration; "
+            f"got ramp {ramp} s, duration {duration} s"
+        )
 
 
 def _plain_count(joint: Joint) -> int:
