@@ -14,10 +14,11 @@ from casysid.inertia import MassProperties, inertial_parameters
 from casysid.robot.lumping import joint_parts, share_out
 from casysid.robot.mjcf import compile_mjcf
 from casysid.robot.mjcf_actuators import actuator_reflection
+from casysid.robot.mjcf_files import name_attached_files, redirect_files
 from casysid.robot.mjcf_text import joint_elements, locate_bodies, own_elements
 from casysid.robot.mjcf_tree import body_names, joint_names
 from casysid.robot.model import Joint, Robot
-from casysid.robot.xmlpatch import XmlPatch, comment, element_text, number_text, path_from
+from casysid.robot.xmlpatch import XmlPatch, comment, element_text, number_text
 from casysid.robot.xmltext import Element, read_bytes
 
 _NEUTRAL = {  # compiler settings that would change a stated inertia, and what they are set to
@@ -28,7 +29,6 @@ _NEUTRAL = {  # compiler settings that would change a stated inertia, and what t
     "settotalmass": None,
 }
 _ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler", "diaginertia")
-_ONE_FILE = "written as one file: what was included, attached or replicated stands in it"
 _MASSLESS = {"pos": "0 0 0", "mass": "0", "diaginertia": "0 0 0"}
 
 
@@ -42,13 +42,15 @@ def mjcf_text(robot: Robot, folder: Path) -> tuple[bytes, list[str]]:
     _refuse_aligned_bodies(spec, robot.source)
     moved = robot.source.parent.resolve() != folder.resolve()
     text, root, elements = locate_bodies(robot.source, spec, compiled, alone=moved or _adjusts_inertia(spec))
-    notes = [] if text == read_bytes(robot.source) else [_ONE_FILE]
-    patch = XmlPatch(text)
+    patch, notes = XmlPatch(text), []
+    if text != read_bytes(robot.source):
+        notes.append("written as one file: what was included, attached or replicated stands in it")
+        name_attached_files(patch, root, compiled, robot.source.parent)
     notes += _patch_inertials(patch, robot, compiled, elements, everywhere=_adjusts_inertia(spec))
     notes += _patch_joints(patch, robot, spec, compiled, elements)
     _neutralise_compiler(patch, root)
     if moved:
-        _redirect_files(patch, root, robot.source.parent, folder)
+        redirect_files(patch, root, robot.source.parent, folder)
     for note in notes:
         patch.prepend(root, comment(note))
     return patch.result(), notes
@@ -173,27 +175,3 @@ def _neutralise_compiler(patch: XmlPatch, root: Element) -> None:
             harmful.pop("inertiafromgeom", None)
         if harmful:
             patch.set(compiler, **harmful)
-
-
-def _redirect_files(patch: XmlPatch, root: Element, origin: Path, folder: Path) -> None:
-    """Lets relative asset paths point from the new folder to where they pointed."""
-    files = [e for e in root.walk() if any(name.startswith("file") for name in e.attributes) and e.tag != "include"]
-    if not files:
-        return
-    folders = {"meshdir": "", "texturedir": ""}
-    for compiler in root.find_all("compiler"):
-        both = compiler.attributes.get("assetdir")
-        for name in folders:
-            folders[name] = compiler.attributes.get(name, both if both is not None else folders[name])
-    redirected = {
-        name: path_from(folder, value, origin) for name, value in folders.items() if not Path(value).is_absolute()
-    }
-    compilers = root.find_all("compiler")
-    if compilers:
-        patch.set(compilers[-1], **redirected)
-    else:
-        patch.prepend(root, element_text("compiler", redirected))
-    for element in files:
-        file = element.attributes.get("file", "")
-        if element.tag == "model" and not Path(file).is_absolute():
-            patch.set(element, file=path_from(folder, file, origin))

@@ -56,6 +56,7 @@ def unlimited(robot):
 
 
 BODY = np.array([2.0, 0.1, 0.2, 0.3, 0.2, -0.01, 0.25, -0.02, -0.03, 0.25])
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 HINGE = f'<body name="a"><joint name="j1" axis="0 1 0"/>{INERTIAL}</body>'
 
 
@@ -109,8 +110,7 @@ def test_an_attached_model_is_written_into_one_file(tmp_path):
 def test_meshes_are_still_found_from_another_folder(tmp_path):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "out").mkdir()
-    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-    (tmp_path / "meshes" / "m.obj").write_text(corners)
+    (tmp_path / "meshes" / "m.obj").write_text(TETRAHEDRON)
     asset = '<asset><mesh name="m" file="{}"/></asset>'
     body = '<body name="a"><joint name="j1"/><geom type="mesh" mesh="m"/></body>'
     for before in ('<compiler meshdir="meshes"/>' + asset.format("m.obj"), asset.format("meshes/m.obj")):
@@ -118,6 +118,23 @@ def test_meshes_are_still_found_from_another_folder(tmp_path):
         written = write_robot(robot, tmp_path / "out" / "new.xml", BODY)
         reads_back(written, BODY)
         mujoco.MjModel.from_xml_path(str(written.path))
+
+
+def test_meshes_of_an_attached_model_are_still_found(tmp_path):
+    (tmp_path / "hand" / "meshes").mkdir(parents=True)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "hand" / "meshes" / "m.obj").write_text(TETRAHEDRON)
+    hand = HINGE.replace("</body>", '<geom type="mesh" mesh="m"/></body>')
+    assets = '<compiler meshdir="meshes"/><asset><mesh name="m" file="m.obj"/></asset>'
+    (tmp_path / "hand" / "hand.xml").write_text(model(hand, before=assets))
+    robot = robot_of(
+        tmp_path,
+        '<mujoco><asset><model name="hand" file="hand/hand.xml"/></asset><worldbody><body name="arm"><joint name="j0"/>'
+        f'{FULL}<attach model="hand" body="a" prefix="l_"/></body></worldbody></mujoco>',
+    )
+    for path in (tmp_path / "new.xml", tmp_path / "out" / "new.xml"):
+        write_robot(robot, path, np.tile(BODY, 2))
+        assert mujoco.MjModel.from_xml_path(str(path)).nmesh == 1
 
 
 def test_a_fixed_body_is_folded_where_the_rest_is_no_body(tmp_path):
