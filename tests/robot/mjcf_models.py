@@ -1,4 +1,8 @@
-"""MJCF texts, each with one thing that a reader or a writer may get wrong."""
+"""MJCF texts, each with one thing that a reader or a writer may get wrong, and random trees."""
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 
 INERTIAL = '<inertial pos=".1 .02 .03" mass="2" diaginertia=".1 .2 .25"/>'
 TURNED = '<inertial pos=".05 -.02 .1" quat=".9 .1 .3 -.2" mass="1.3" diaginertia=".03 .02 .04"/>'
@@ -77,3 +81,31 @@ CASES = {
         before='<option gravity="1 2 -9"/>',
     ),
 }
+
+
+@st.composite
+def trees(draw) -> str:
+    """Random trees: bodies with none, one or two joints of any kind, turned, offset, with reference positions."""
+    depth = draw(st.integers(1, 4))
+    bodies, closing = "", ""
+    for b in range(depth):
+        x = draw(hnp.arrays(np.float64, 18, elements=st.floats(-1.0, 1.0, width=32)))
+        kinds = ["hinge"] if b == 0 else draw(st.sampled_from([[], ["hinge"], ["ball"], ["slide", "hinge"], ["slide"]]))
+        joints = "".join(_joint(f"{kind}{b}", kind, x) for kind in kinds)
+        quat = _text([1.5, *x[:3]])
+        bodies += f'<body name="b{b}" pos="{_text(x[3:6])}" quat="{quat}">{joints}{INERTIAL}'
+        if draw(st.booleans()):
+            bodies, closing = bodies + f'<body name="f{b}" pos="{_text(x[6:9])}">{TURNED}</body>', closing
+        branches = draw(st.booleans())
+        bodies, closing = (bodies + "</body>", closing) if branches else (bodies, closing + "</body>")
+    return model(bodies + closing)
+
+
+def _joint(name: str, kind: str, x: np.ndarray) -> str:
+    ref = f'ref="{float(x[15])!r}"' if kind in ("hinge", "slide") else ""
+    axis, damping = _text([x[12], x[13], 1.5]), abs(float(x[16]))
+    return f'<joint name="{name}" type="{kind}" axis="{axis}" pos="{_text(x[9:12])}" damping="{damping!r}" {ref}/>'
+
+
+def _text(values) -> str:
+    return " ".join(repr(float(x)) for x in values)

@@ -2,10 +2,11 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import HealthCheck, given, settings
 
 from casysid.errors import CasysidWarning, RobotError
 from casysid.robot import FaultKind, JointKind, Robot
-from tests.robot.mjcf_models import CASES, FULL, INERTIAL, model
+from tests.robot.mjcf_models import CASES, FULL, INERTIAL, model, trees
 
 DISABLED = (
     mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT | mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS
@@ -42,14 +43,23 @@ def mujoco_torque(compiled, robot, rng):
     return q, v, a, tau
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_model_has_the_inverse_dynamics_of_mujoco(name, read):
-    robot, rng = read(CASES[name]), np.random.default_rng(1)
-    compiled = mujoco.MjModel.from_xml_string(CASES[name])
+def has_the_dynamics_of(robot, text):
+    rng, compiled = np.random.default_rng(1), mujoco.MjModel.from_xml_string(text)
     for _ in range(5):
         q, v, a, tau = mujoco_torque(compiled, robot, rng)
         predicted = pin.rnea(robot.model, robot.model.createData(), q, v, a) + robot.damping * v
         np.testing.assert_allclose(predicted, tau, atol=1e-12 * max(1.0, abs(tau).max()))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_model_has_the_inverse_dynamics_of_mujoco(name, read):
+    has_the_dynamics_of(read(CASES[name]), CASES[name])
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(text=trees())
+def test_any_tree_has_the_inverse_dynamics_of_mujoco(text, read):
+    has_the_dynamics_of(read(text), text)
 
 
 HINGE = f'<body name="a"><joint name="j1" axis="0 1 0"/>{INERTIAL}'

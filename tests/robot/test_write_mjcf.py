@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from casysid.errors import CasysidWarning, RobotError
 from casysid.robot import Robot, write_robot
 from tests.robot.bodies import consistent_parameters
-from tests.robot.mjcf_models import CASES, FULL, INERTIAL, TURNED, model
+from tests.robot.mjcf_models import CASES, FULL, INERTIAL, TURNED, model, trees
 
 
 def robot_of(tmp_path, text, **options):
@@ -26,27 +26,35 @@ def torque_of_regressor(robot, theta, armature, q, v, a):
     return Y[:, columns] @ theta + armature * a
 
 
+def is_written_as(tmp_path, text, data):
+    robot = robot_of(tmp_path, text)
+    theta = data.draw(consistent_parameters(len(robot.links)))
+    friction = np.concatenate([np.full(j.v.stop - j.v.start, 0.1 * k + 1 / 3) for k, j in enumerate(robot.joints)])
+    values = {"damping": friction, "dry_friction": friction / 2, "armature": friction / 10}
+    if "<freejoint" in text:
+        values = {name: getattr(robot, name) for name in values}
+    again = Robot.from_mjcf(write_robot(robot, tmp_path / "new.xml", theta, **values).path)
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        q, v, a = pin.randomConfiguration(unlimited(robot)), rng.normal(size=robot.nv), rng.normal(size=robot.nv)
+        wanted = torque_of_regressor(robot, theta, values["armature"], q, v, a)
+        got = pin.rnea(again.model, again.model.createData(), q, v, a)
+        np.testing.assert_allclose(got, wanted, atol=1e-9 * abs(wanted).max())
+    np.testing.assert_allclose(again.damping, values["damping"], rtol=1e-12)
+    np.testing.assert_allclose(again.dry_friction, values["dry_friction"], rtol=1e-12)
+
+
 @pytest.mark.parametrize("name", CASES)
 @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_written_model_moves_as_its_parameters_say(name, data, tmp_path):
-    robot = robot_of(tmp_path, CASES[name])
-    theta = data.draw(consistent_parameters(len(robot.links)))
-    damping, friction, armature = (np.zeros(robot.nv) for _ in range(3))
-    for i, joint in enumerate(robot.joints):
-        damping[joint.v], friction[joint.v], armature[joint.v] = 0.1 * i + 1 / 3, 0.2 * i + 1 / 7, 0.01 * i + 0.1 / 3
-    if "free" in name:
-        damping, friction, armature = robot.damping, robot.dry_friction, robot.armature
-    written = write_robot(robot, tmp_path / "new.xml", theta, damping=damping, dry_friction=friction, armature=armature)
-    again = Robot.from_mjcf(written.path)
-    rng = np.random.default_rng(0)
-    for _ in range(3):
-        q, v, a = pin.randomConfiguration(unlimited(robot)), rng.normal(size=robot.nv), rng.normal(size=robot.nv)
-        wanted = torque_of_regressor(robot, theta, armature, q, v, a)
-        got = pin.rnea(again.model, again.model.createData(), q, v, a)
-        np.testing.assert_allclose(got, wanted, atol=1e-9 * abs(wanted).max())
-    np.testing.assert_allclose(again.damping, damping, rtol=1e-14)
-    np.testing.assert_allclose(again.dry_friction, friction, rtol=1e-14)
+    is_written_as(tmp_path, CASES[name], data)
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(text=trees(), data=st.data())
+def test_a_written_tree_moves_as_its_parameters_say(text, data, tmp_path):
+    is_written_as(tmp_path, text, data)
 
 
 def unlimited(robot):
