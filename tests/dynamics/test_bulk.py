@@ -43,10 +43,10 @@ def every_operation():
     c = p[0] < p[1]
     return ca.vertcat(
         -X, X + s, X - s, X * s, X / s, 1 / s, X * X, 2 * X, s ** p[0], s**2.5, ca.sqrt(s), ca.exp(X), ca.expm1(X),
-        ca.log(s), ca.log1p(s), ca.sin(X), ca.cos(X), ca.tan(s), ca.asin(s), ca.acos(s), ca.atan(X), ca.atan2(X, s), ca.sinh(X),
-        ca.cosh(X), ca.tanh(X), ca.asinh(X), ca.acosh(1 + s), ca.atanh(s), ca.erf(X), ca.hypot(X, s), ca.fabs(X),
-        ca.sign(X), ca.copysign(s, X), ca.fmin(X, s), ca.fmax(X, s), ca.fmod(X, s), ca.floor(X), ca.ceil(X), c,
-        p[0] <= p[1], p[0] == p[1], p[0] != p[1], ca.logic_and(c, X), ca.logic_or(c, X > 0), ca.logic_not(c),
+        ca.log(s), ca.log1p(s), ca.sin(X), ca.cos(X), ca.tan(s), ca.asin(s), ca.acos(s), ca.atan(X), ca.atan2(X, s),
+        ca.sinh(X), ca.cosh(X), ca.tanh(X), ca.asinh(X), ca.acosh(1 + s), ca.atanh(s), ca.erf(X), ca.hypot(X, s),
+        ca.fabs(X), ca.sign(X), ca.copysign(s, X), ca.fmin(X, s), ca.fmax(X, s), ca.fmod(X, s), ca.floor(X), ca.ceil(X),
+        c, p[0] <= p[1], p[0] == p[1], p[0] != p[1], ca.logic_and(c, X), ca.logic_or(c, X > 0), ca.logic_not(c),
         ca.if_else(c, X, s), ca.if_else(c, 3.0, 0.0), ca.SX(7),
     )  # fmt: skip
 
