@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
@@ -102,13 +103,20 @@ def compile_mjcf(path: Path) -> tuple[Any, Any, list[str]]:
 
 
 def _parse(path: Path) -> Any:
-    spec = mujoco.MjSpec.from_file(str(path))
+    """The ``MjSpec``; MuJoCo itself opens no file by another suffix than ``.xml``."""
+    if path.suffix == ".xml":
+        spec = mujoco.MjSpec.from_file(str(path))
+    else:
+        spec = mujoco.MjSpec.from_string(path.read_text(encoding="utf-8"))
+        spec.modelfiledir = f"{path.parent}{os.sep}"
     spec.compiler.fusestatic = False
     return spec
 
 
 def _refusal(path: Path, error: ValueError, hint: str = "") -> RobotError:
     reason = " ".join(str(error).split())
+    if reason.startswith("XML Error") and "opening file" in reason and path.suffix != ".xml":
+        hint += "; includes are found only from a file named .xml"
     return RobotError(f"{path}: MuJoCo does not accept the file: {reason}{hint}")
 
 

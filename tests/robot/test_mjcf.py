@@ -214,6 +214,17 @@ def test_missing_meshes_are_forgiven_where_bodies_state_their_inertia(read):
     assert robot.inertial_parameters[0] == 2.0
 
 
+def test_another_suffix_is_read_with_its_meshes_but_not_its_includes(tmp_path):
+    path = tmp_path / "robot.mjcf"
+    (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    mesh = '<asset><mesh name="m" file="m.obj"/></asset>'
+    path.write_text(model('<body name="a"><joint/><geom type="mesh" mesh="m"/></body>', before=mesh))
+    assert Robot.from_file(path).inertial_parameters[0] > 1.0
+    path.write_text(model('<include file="x.xml"/>'))
+    with pytest.raises(RobotError, match=r"x\.xml.*includes are found only from a file named \.xml"):
+        Robot.from_file(path)
+
+
 def test_messages_of_mujoco_are_passed_on(read):
     with pytest.warns(CasysidWarning, match=r"robot.xml: MuJoCo: compiler attribute 'settotalmass' is deprecated"):
         assert read(model(PAIR, before='<compiler settotalmass="5"/>')).nv == 2
