@@ -10,6 +10,7 @@ from casysid.simulation.run import simulate
 from casysid.simulation.settings import (
     IDEAL,
     NO_MECHANICS,
+    PERFECT_ACTUATION,
     PERFECT_SENSING,
     PLAIN_MECHANICS,
     Actuation,
@@ -23,6 +24,7 @@ __all__ = [
     "IDEAL",
     "NO_MECHANICS",
     "PD",
+    "PERFECT_ACTUATION",
     "PERFECT_SENSING",
     "PLAIN_MECHANICS",
     "Actuation",

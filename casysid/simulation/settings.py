@@ -73,10 +73,13 @@ class Actuation:
     Attributes:
         lag: Time constant of the first-order response [s]; 0 is none: the torque then jumps at each tick.
         saturation: Whether torques stop at the effort limits.
+        resolution: Step of the torque asked for, as 16 bits have it, share of the torque scale. It also swallows the
+            rounding errors by which one computation of a command differs from another.
     """
 
     lag: float = 0.002
     saturation: bool = True
+    resolution: float = 3e-5
 
     def __post_init__(self) -> None:
         _check_not_negative(self)
@@ -144,6 +147,9 @@ NO_MECHANICS = Mechanics(
 PLAIN_MECHANICS = Mechanics(offset_level=0.0, stiction=1.0, cable_pull=0.0)
 """Rigid bodies with viscous and Coulomb friction and armature: nothing that the regressor lacks."""
 
+PERFECT_ACTUATION = Actuation(lag=0.0, saturation=False, resolution=0.0)
+"""What is asked for acts."""
+
 PERFECT_SENSING = Sensing(
     position_noise=0.0,
     position_resolution=0.0,
@@ -155,7 +161,5 @@ PERFECT_SENSING = Sensing(
 )
 """The log is the truth."""
 
-IDEAL = PlantSettings(
-    mechanics=PLAIN_MECHANICS, actuation=Actuation(lag=0.0, saturation=False), sensing=PERFECT_SENSING
-)
+IDEAL = PlantSettings(mechanics=PLAIN_MECHANICS, actuation=PERFECT_ACTUATION, sensing=PERFECT_SENSING)
 """A machine that does what the model says and logs what it does."""

@@ -15,6 +15,7 @@ from casysid.simulation import (
     IDEAL,
     NO_MECHANICS,
     PD,
+    PERFECT_ACTUATION,
     PERFECT_SENSING,
     PLAIN_MECHANICS,
     Actuation,
@@ -61,9 +62,7 @@ def rigid_and_viscous(plant, run):
 
 
 def with_sensing(**changes):
-    return PlantSettings(
-        mechanics=PLAIN_MECHANICS, actuation=Actuation(lag=0.0, saturation=False), sensing=Sensing(**PERFECT | changes)
-    )
+    return PlantSettings(mechanics=PLAIN_MECHANICS, actuation=PERFECT_ACTUATION, sensing=Sensing(**PERFECT | changes))
 
 
 @pytest.mark.parametrize("name", ["two_link", "scara", "head", "arm"])
@@ -250,6 +249,26 @@ def test_stiction_holds_a_robot_that_is_pushed_less():
     moved = simulate(plant, Push(1.6 * robot.dry_friction[1]), motion, rate=RATE, duration=0.2)
     assert abs(still.q[-1, 1] - still.q[0, 1]) < 1e-4
     assert abs(moved.q[-1, 1] - moved.q[0, 1]) > 1e-3
+
+
+def test_commands_come_in_whole_steps_and_hide_rounding_errors():
+    robot = load("head")
+    plant = Plant(robot)
+
+    class Rounded(ComputedTorque):
+        def plan(self, reference):
+            return super().plan(reference) * (1 + 2e-16)
+
+    model, feedback = ControlModel.from_robot(robot, plant.parameters), PD.tuned(robot, plant.parameters)
+    motion = design_sinusoids(robot, duration=2.0, ramp=0.4)
+    runs = [
+        simulate(plant, controller, motion, rate=RATE, duration=2.0)
+        for controller in (ComputedTorque(model, feedback), Rounded(model, feedback))
+    ]
+    np.testing.assert_array_equal(runs[0].recording.position, runs[1].recording.position)
+    coarse = dataclasses.replace(IDEAL, actuation=dataclasses.replace(PERFECT_ACTUATION, resolution=0.01))
+    steps = follow(Plant(robot, coarse), duration=1.0).tau / (0.01 * plant.torque_scale)
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
 
 
 def test_cables_pull_with_their_share_at_the_end_of_the_range():
