@@ -1,6 +1,6 @@
 """Figure 2 of Ting et al. (2006): how well each estimator predicts when inputs are noisy, redundant and irrelevant.
 
-    python scripts/reproduce_figure_2.py --out DIR [--trials 10] [--samples 1000] [--seed 0] [--workers 2]
+    python scripts/reproduce_figure_2.py --out DIR [--trials 10] [--samples 1000] [--seed 0] [--methods ols,bayes]
 
 Writes DIR/figure_2.png and DIR/figure_2.json: by input signal-to-noise ratio, number of redundant inputs and estimator,
 the normalised mean squared error on noiseless ("clean") and on noisy test rows, mean and deviation over the trials.
@@ -9,11 +9,12 @@ the normalised mean squared error on noiseless ("clean") and on noisy test rows,
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import multiprocessing
 import os
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,7 +24,6 @@ from synthetic_regression import Array, Problem, Sample, draw_problem
 
 from casysid.errors import CasysidWarning
 from casysid.estimation.base import Estimator
-from casysid.estimation.least_squares import OrdinaryLeastSquares
 from casysid.moments import Moments
 
 if TYPE_CHECKING:
@@ -34,30 +34,26 @@ OUTPUT_SNR = 5
 REDUNDANT = (0, 30, 60, 90)
 BLOCKS = 10  # of the training rows, for cross-validation
 
+METHODS = {  # module and class, in the order of the bars: the paper's methods, and two more
+    "ols": ("least_squares", "OrdinaryLeastSquares"),
+    "stepwise": ("stepwise", "StepwiseRegression"),
+    "pls": ("partial_least_squares", "PartialLeastSquares"),
+    "lasso": ("lasso", "LassoRegression"),
+    "jfa": ("joint_factor_analysis", "JointFactorAnalysis"),
+    "bayes": ("bayesian", "BayesianDenoising"),
+    "ard": ("relevance", "RelevanceRegression"),
+    "tls": ("total_least_squares", "TotalLeastSquares"),
+}
+
 Errors = dict[str, tuple[float, float]]  # clean and noisy error by method
 Table = dict[str, dict[str, dict[str, dict[str, float]]]]
 
 
-def build_estimators() -> dict[str, Estimator]:
-    """The methods of the figure with their defaults, and two more (ARD, TLS)."""
-    from casysid.estimation.bayesian import BayesianDenoising
-    from casysid.estimation.joint_factor_analysis import JointFactorAnalysis
-
-    from casysid.estimation.lasso import LassoRegression
-    from casysid.estimation.partial_least_squares import PartialLeastSquares
-    from casysid.estimation.relevance import RelevanceRegression
-    from casysid.estimation.stepwise import StepwiseRegression
-    from casysid.estimation.total_least_squares import TotalLeastSquares
-
+def build_estimators(methods: Sequence[str]) -> dict[str, Estimator]:
+    """The named methods with their defaults."""
     return {
-        "ols": OrdinaryLeastSquares(),
-        "stepwise": StepwiseRegression(),
-        "pls": PartialLeastSquares(),
-        "lasso": LassoRegression(),
-        "jfa": JointFactorAnalysis(),
-        "bayes": BayesianDenoising(),
-        "ard": RelevanceRegression(),
-        "tls": TotalLeastSquares(),
+        name: getattr(importlib.import_module(f"casysid.estimation.{METHODS[name][0]}"), METHODS[name][1])()
+        for name in methods
     }
 
 
@@ -66,13 +62,13 @@ def normalised_error(sample: Sample, parameters: Array) -> float:
     return float(np.mean((sample.y - sample.x @ parameters) ** 2) / np.var(sample.y))
 
 
-def run_trial(problem: Problem) -> Errors:
-    """Clean and noisy test error of every method on one draw."""
+def run_trial(problem: Problem, methods: Sequence[str]) -> Errors:
+    """Clean and noisy test error of the methods on one draw."""
     moments = Moments.from_rows(problem.train.x, problem.train.y, blocks=BLOCKS)
     errors = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CasysidWarning)  # weak answers are what the figure shows
-        for name, estimator in build_estimators().items():
+        for name, estimator in build_estimators(methods).items():
             parameters = estimator.estimate(moments).parameters
             errors[name] = (
                 normalised_error(problem.clean_test, parameters),
@@ -81,19 +77,21 @@ def run_trial(problem: Problem) -> Errors:
     return errors
 
 
-def run_cell(snr: int, redundant: int, trial: int, samples: int, seed: int) -> Errors:
+def run_cell(snr: int, redundant: int, trial: int, samples: int, seed: int, methods: Sequence[str]) -> Errors:
     """One trial by its coordinates; both signal-to-noise ratios see the same draws."""
     rng = np.random.default_rng([seed, redundant, trial])
-    return run_trial(draw_problem(rng, samples, snr, OUTPUT_SNR, redundant))
+    return run_trial(draw_problem(rng, samples, snr, OUTPUT_SNR, redundant), methods)
 
 
-def run_trials(trials: int, samples: int, seed: int, workers: int, advance: Callable[[], None]) -> Table:
+def run_trials(
+    trials: int, samples: int, seed: int, methods: Sequence[str], *, workers: int, advance: Callable[[], None]
+) -> Table:
     """Every trial, spread over processes; ``advance`` is called after each."""
     cells = [(snr, r, trial) for trial in range(trials) for snr in INPUT_SNRS for r in REDUNDANT]
     os.environ["OMP_NUM_THREADS"] = "1"  # inherited by the processes, which would else fight for the cores
     collected: dict[tuple[int, int], list[Errors]] = {}
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        futures = {pool.submit(run_cell, *cell, samples, seed): cell for cell in cells}
+        futures = {pool.submit(run_cell, *cell, samples, seed, methods): cell for cell in cells}
         for future in as_completed(futures):
             snr, r, _ = futures[future]
             collected.setdefault((snr, r), []).append(future.result())
@@ -206,7 +204,11 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=1000, help="rows of each training and test set")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1), help="processes")
+    parser.add_argument("--methods", default=",".join(METHODS), help="some of %(default)s")
     options = parser.parse_args()
+    methods = options.methods.split(",")
+    if unknown := set(methods) - set(METHODS):
+        parser.error(f"--methods: wanted some of {', '.join(METHODS)}; got {', '.join(sorted(unknown))}")
     if min(options.trials, options.workers) < 1 or options.samples < BLOCKS:
         parser.error(f"wanted --trials and --workers of at least 1 and --samples of at least {BLOCKS}")
 
@@ -220,11 +222,16 @@ def main() -> None:
     with Progress(*columns, console=console) as progress:
         task = progress.add_task("trials", total=options.trials * len(INPUT_SNRS) * len(REDUNDANT))
         table = run_trials(
-            options.trials, options.samples, options.seed, options.workers, lambda: progress.advance(task)
+            options.trials,
+            options.samples,
+            options.seed,
+            methods,
+            workers=options.workers,
+            advance=lambda: progress.advance(task),
         )
     write_json(table, options.out / "figure_2.json")
     draw_figure(table, options.out / "figure_2.png", options.trials)
-    shown = RichTable("SNR", "r", *LABELS, title="normalised mean squared error: clean, noisy test rows")
+    shown = RichTable("SNR", "r", *methods, title="normalised mean squared error: clean, noisy test rows")
     for row in format_rows(table):
         shown.add_row(*row)
     console.print(shown)

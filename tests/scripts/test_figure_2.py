@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
-METHODS = ("ols", "stepwise", "pls", "lasso", "jfa", "bayes", "ard", "tls")
+METHODS = ("ols", "stepwise", "ard", "tls")
 
 
 @pytest.fixture(scope="module")
@@ -47,9 +47,9 @@ def test_the_picture_and_the_numbers_are_written_whole(scripts, tmp_path: Path) 
     assert cell["ols"] == {"clean": 0.1, "noisy": 0.4, "clean_std": 0.0, "noisy_std": 0.0}
 
 
-@pytest.mark.slow
-def test_a_trial_has_every_method_and_selection_beats_least_squares_on_noiseless_rows(scripts) -> None:
-    errors = scripts("reproduce_figure_2").run_cell(2, 0, 0, 1000, 0)
+def test_a_trial_can_be_run_again_and_selection_beats_least_squares_among_irrelevant_inputs(scripts) -> None:
+    run = scripts("reproduce_figure_2").run_cell
+    errors = run(2, 0, 0, 1000, 0, METHODS)
     assert tuple(errors) == METHODS
+    assert errors == run(2, 0, 0, 1000, 0, METHODS)
     assert errors["stepwise"][0] < errors["ols"][0]
-    assert errors["bayes"][0] < errors["ols"][0]
