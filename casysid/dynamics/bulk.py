@@ -23,6 +23,7 @@ from casysid.errors import ParameterError
 
 FIND_FROM = 10_000  # samples: evaluating fewer takes no longer than looking for a compiled kernel
 COMPILE_FROM = 100_000  # samples: replaying more takes longer than compiling
+MOST_NUMBERS = 2**23  # in the memory of one thread: shorter chunks for very large robots
 
 Result = TypeVar("Result")
 Indices = npt.NDArray[np.intp]
@@ -99,12 +100,14 @@ class Bulk:
         Yields:
             Number of the group, and the result of ``consume``.
         """
-        self._choose_route(inputs, sum(len(group) for group in groups))
-        pieces = _split(groups, replay.SAMPLES if self._kernel is None else compiled.SAMPLES)
+        kernel = self._choose_route(inputs, sum(len(group) for group in groups))
+        rows = self.function.nnz_out(0) + self.function.sz_w()
+        longest = replay.SAMPLES if kernel is None else compiled.SAMPLES
+        pieces = _split(groups, min(longest, max(MOST_NUMBERS // rows, 64)))
         threads = max(min(threads, len(pieces)), 1)
         engines: SimpleQueue[Engine] = SimpleQueue()
         for _ in range(threads):
-            engines.put(self._engine(self._kernel, max((len(piece) for _, piece in pieces), default=0)))
+            engines.put(self._engine(kernel, max((len(piece) for _, piece in pieces), default=0)))
 
         def work(piece: Indices) -> Result:
             engine = engines.get()
@@ -141,16 +144,17 @@ class Bulk:
             raise ParameterError(f"{function.name()}: wants {wanted}; got {', '.join(str(x.shape) for x in arrays)}")
         return arrays, lengths.pop() if lengths else 1
 
-    def _choose_route(self, inputs: Sequence[Array], samples: int) -> None:
-        """Look for a compiled kernel, or compile one, once so many samples have come that it pays."""
+    def _choose_route(self, inputs: Sequence[Array], samples: int) -> compiled.Kernel | None:
+        """The kernel, if there is one: looked for, or compiled, once so many samples have come that it pays."""
         with self._lock:
             self._seen += samples
             if self.function.n_instructions() > compiled.LONGEST:
-                return
+                return None
             while self._kernel is None and self._untried and self._seen >= self._untried[0][0]:
                 kernel = self._untried.pop(0)[1](self.function)
                 if kernel is not None and self._agrees(kernel, inputs):
                     self._kernel = kernel
+            return self._kernel
 
     def _agrees(self, kernel: compiled.Kernel, inputs: Sequence[Array]) -> bool:
         """Whether a kernel gives what the replay gives at the first samples: no compiler's fault may pass for data."""

@@ -21,7 +21,7 @@ import numpy as np
 
 from casysid.dynamics.instructions import Operation, count_inputs, interpret
 
-SAMPLES = 1024  # inputs and outputs of so many samples stay in a core's cache
+SAMPLES = 1024  # fewer make the sums slow, more leave the processor's cache
 LONGEST = 60_000  # operations; more would keep a compiler busy for minutes
 Kernel = Callable[[int, int, int], None]
 _MOST_LANES = 8
