@@ -123,7 +123,7 @@ def _positions(joint: Joint, rng: np.random.Generator, samples: int) -> Array:
 
 
 def _joint_model(kind: JointKind, rng: np.random.Generator) -> object:
-    """A joint about a coordinate axis or, as often, about any axis where Pinocchio can be given one."""
+    """A joint about a coordinate axis or, as often, about any axis."""
     aligned, axis = rng.integers(3), _unit(rng.normal(size=3))
     match kind:
         case JointKind.REVOLUTE:
@@ -133,13 +133,23 @@ def _joint_model(kind: JointKind, rng: np.random.Generator) -> object:
             choices = pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ
             return choices[aligned]() if rng.random() < 0.5 else pin.JointModelPrismaticUnaligned(axis)
         case JointKind.CONTINUOUS:
-            return (pin.JointModelRUBX, pin.JointModelRUBY, pin.JointModelRUBZ)[aligned]()
+            choices = pin.JointModelRUBX, pin.JointModelRUBY, pin.JointModelRUBZ
+            return choices[aligned]() if rng.random() < 0.5 else _continuous_about(axis)
         case JointKind.SPHERICAL:
             return pin.JointModelSpherical()
         case JointKind.PLANAR:
             return pin.JointModelPlanar()
         case JointKind.FREE_FLYER:
             return pin.JointModelFreeFlyer()
+
+
+def _continuous_about(axis: Array) -> object:
+    """Pinocchio's Python makes this joint only when it reads a file."""
+    x, y, z = axis
+    return pin.buildModelFromXML(
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous"><parent link="a"/>'
+        f'<child link="b"/><axis xyz="{x} {y} {z}"/></joint></robot>'
+    ).joints[1]
 
 
 def _unit(vectors: Array) -> Array:

@@ -114,6 +114,22 @@ def test_a_floating_base_has_no_friction_columns():
     assert owners == ["joint_2_wx", "joint_2_wy", "joint_2_wz"]
 
 
+def test_a_massless_joint_between_two_of_one_body_has_no_columns(tmp_path):
+    path = tmp_path / "universal.xml"
+    path.write_text(
+        '<mujoco><worldbody><body name="b" pos="0 0 1"><joint name="x" axis="1 0 0" armature="0.1"/>'
+        '<joint name="y" axis="0 1 0" pos="0.1 0 0" armature="0.2"/>'
+        '<inertial pos="0.1 0.2 0.3" mass="2" diaginertia="0.1 0.2 0.25"/></body></worldbody></mujoco>'
+    )
+    robot = Robot.from_file(path)
+    regressor = build_regressor(robot)
+    q, v, a = random_motion(robot, np.random.default_rng(0), 5)
+    assert regressor.names[10:] == tuple(f"{d}.{k}" for k in ("viscous", "coulomb", "offset", "armature") for d in "xy")
+    data = robot.model.createData()
+    rigid = [pin.rnea(robot.model, data, *state) for state in zip(q, v, a, strict=True)]
+    assert_close(regressor.predict(regressor.prior, q, v, a), rigid)
+
+
 def test_a_pickled_regressor_gives_the_same():
     robot = random_robot(np.random.default_rng(0), [JointKind.REVOLUTE, JointKind.SPHERICAL])
     regressor = build_regressor(robot)
