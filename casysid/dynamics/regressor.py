@@ -159,11 +159,12 @@ def build_regressor(
         couplings: Motors that act on several joints.
 
     Raises:
-        ParameterError: When two friction columns are of the same kind, a coupling names an unknown joint, or a column
-            uses the position of a degree of freedom that has none.
+        ParameterError: When a kind of friction or a coupling is given twice, a coupling names an unknown joint, or a
+            column uses the position of a degree of freedom that has none.
     """
-    if len({column.kind for column in friction}) != len(friction):
-        raise ParameterError(f"friction: every kind once; got {[column.kind for column in friction]}")
+    kinds, coupled = [column.kind for column in friction], [coupling.joints for coupling in couplings]
+    if len(set(kinds)) != len(kinds) or len(set(coupled)) != len(coupled):
+        raise ParameterError(f"friction: every kind and every coupling once; got {kinds} and {coupled}")
     state = symbolic.State.of(robot)
     motions = symbolic.link_motions(robot, state)
     drive = list(_drive_columns(robot, state, friction, couplings))
@@ -200,9 +201,10 @@ def _drive_columns(
     def build(column: FrictionColumn, direction: Direction, prior: float) -> tuple[Parameter, Any] | None:
         weights = constant(direction.weights)
         s, ds, dds = (weights.T @ x for x in (positions, state.v, state.a))
-        torque = column.torque(direction, s, ds, dds)
-        if torque is None:
+        expression = column.torque(direction, s, ds, dds)
+        if expression is None:
             return None
+        torque = ca.SX(expression)
         if ca.depends_on(torque, missing):
             raise ParameterError(
                 f"friction: '{column.kind}' uses the position of '{direction.name}', which has none; return None there"
@@ -227,8 +229,8 @@ def _drive_columns(
 
 def _positions(robot: Robot, state: symbolic.State) -> tuple[Any, Any]:
     """The coordinate of each degree of freedom (nv,), with a symbol where there is none; and these symbols."""
-    positions = missing = ca.SX.sym("position", robot.nv)
-    positions = ca.SX(positions)
+    missing = ca.SX.sym("position", robot.nv)
+    positions = ca.SX(missing)
     for joint in robot.joints:
         match joint.kind:
             case JointKind.REVOLUTE | JointKind.PRISMATIC:

@@ -138,7 +138,8 @@ def test_a_width_that_is_not_positive_is_refused(width):
     [
         ([Coulomb(width=(0.1, 0.2))], [], "one for each of the 3 degrees of freedom; got 2"),
         ([Coulomb(width={"joint_1": 0.1})], [], "'joint_2' is missing"),
-        ([Viscous(), Viscous()], [], "every kind once"),
+        ([Viscous(), Viscous()], [], "every kind and every coupling once"),
+        ([Viscous()], [Coupling(("joint_1", "joint_2"), (1.0, 1.0))] * 2, "every kind and every coupling once"),
         (
             [Viscous()],
             [Coupling(("joint_1", "elbow"), (1.0, 1.0))],
