@@ -86,7 +86,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     parser.add_argument("--methods", default="ols,wls,ridge")
-    parser.add_argument("--consistency", choices=["none", "inertia", "full"], default="none")
+    parser.add_argument("--consistency", choices=["none", "inertia", "full"], default="full")
     parser.add_argument("--robots", default=",".join(trial.folder for trial in TRIALS))
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
@@ -114,6 +114,7 @@ def main() -> None:
             "cutoff": cutoff,
             "held_out": errors,
             "unfiltered": {name: result.held_out.relative_unfiltered for name, result in results.items()},
+            "unconstrained": {name: result.unconstrained.relative for name, result in results.items()},
             "consistent": {name: result.is_physically_consistent for name, result in results.items()},
             "file": any_result.file.relative,
             "seconds": seconds,

@@ -40,7 +40,7 @@ def identify(
     method: Annotated[str, typer.Option(help="Estimator: ols, wls or ridge.")] = "ridge",
     consistency: Annotated[
         ConsistencyChoice, typer.Option(help="Physical laws that the answer is made to obey.")
-    ] = ConsistencyChoice.NONE,
+    ] = ConsistencyChoice.FULL,
     cutoff: Annotated[float | None, typer.Option(help="Low-pass cut-off [Hz]; default: chosen by the data.")] = None,
     coupling: Annotated[
         list[str] | None,

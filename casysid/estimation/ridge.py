@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -39,6 +40,8 @@ class Ridge:
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """Parameters between the prior and weighted least squares, as far as the data's own prediction error asks.
 
+        The metric of the estimate holds the pull to the prior too, so that a projection does not undo it.
+
         Raises:
             ParameterError: The strength is to be chosen and there is a single block.
         """
@@ -53,9 +56,11 @@ class Ridge:
         noise = max(normal.residual_energy(coefficients), 0.0) / max(float(problem.count.sum()), 1.0)
         covariance = (vectors * (noise / shrunk)) @ vectors.T
         freedom = float((values / shrunk).sum())
-        return problem.to_estimate(
+        estimate = problem.to_estimate(
             self.name, coefficients, covariance, diagnostics={"strength": strength, "effective_parameters": freedom}
         )
+        pull = strength * np.diag(np.diag(problem.metric))
+        return dataclasses.replace(estimate, metric=problem.metric + pull)
 
 
 def choose_strength(problem: StandardisedProblem, folds: int) -> float:

@@ -9,13 +9,15 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import RecordingError
+from casysid.estimation import Estimate
 from casysid.identifiability import excited_base_parameters, structural_base_parameters
 from casysid.identification.coulomb import choose_relative_width
 from casysid.identification.cutoff import COARSE_STEP, FINE_STEP, CutoffChoice, choose_cutoff
 from casysid.identification.prediction import torque_error
-from casysid.identification.problem import USUAL_WIDTH, build_problem
+from casysid.identification.problem import USUAL_WIDTH, LinearProblem, build_problem
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
+from casysid.projection import ProjectionResult, build_projection, project
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.signals import motion_from_recording
@@ -62,13 +64,17 @@ def identify(
     regressor = problem.regressor
     estimate = settings.method.estimate(problem.moments, regressor.prior)
     clock.lap("estimate")
+    projection = _project(problem, estimate, settings, progress)
+    clock.lap("projection")
     progress("check", 0.0)
+    parameters = estimate.parameters if projection is None else projection.parameters
     held_out_motions = tuple(motion_from_recording(robot, recording, cutoff.cutoff) for recording in held_out)
     judged = held_out_motions or problem.motions
     structural = structural_base_parameters(regressor)
     excited = excited_base_parameters(regressor, problem.moments, estimate.noise_std)
-    train = torque_error(regressor, estimate.parameters, problem.motions)
-    unseen = torque_error(regressor, estimate.parameters, held_out_motions) if held_out_motions else None
+    train = torque_error(regressor, parameters, problem.motions)
+    unseen = torque_error(regressor, parameters, held_out_motions) if held_out_motions else None
+    unconstrained = torque_error(regressor, estimate.parameters, judged)
     file = torque_error(regressor, regressor.prior, judged)
     clock.lap("check")
     progress("check", 1.0)
@@ -78,15 +84,35 @@ def identify(
         cutoff=cutoff,
         regressor=regressor,
         estimate=estimate,
-        parameters=estimate.parameters,
+        projection=projection,
         structural=structural,
         excited=excited,
+        unconstrained=unconstrained,
         train=train,
         held_out=unseen,
         file=file,
         train_motions=problem.motions,
         held_out_motions=held_out_motions,
         seconds=clock.laps,
+    )
+
+
+def _project(
+    problem: LinearProblem, estimate: Estimate, settings: Settings, progress: Progress
+) -> ProjectionResult | None:
+    """The nearest consistent parameters in the estimate's own metric; None when consistency is not asked for."""
+    if settings.consistency is None:
+        return None
+    progress("projection", 0.0)
+    regressor = problem.regressor
+    projection = build_projection(regressor.parameters, consistency=settings.consistency, knowledge=settings.knowledge)
+    weighted = problem.moments.pooled(estimate.noise_std**-2.0)
+    return project(
+        projection,
+        estimate.parameters,
+        estimate.metric,
+        regressor.prior,
+        residual_energy=weighted.residual_energy(estimate.parameters),
     )
 
 

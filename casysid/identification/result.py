@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from casysid.arrays import Array, frozen
+from casysid.arrays import Array
 from casysid.dynamics import Regressor
 from casysid.estimation import Estimate, Status
 from casysid.identifiability import BaseParameters
@@ -17,6 +17,7 @@ from casysid.identification.links import LinkProperties, link_properties
 from casysid.identification.prediction import TorqueError
 from casysid.identification.settings import Settings
 from casysid.inertia import smallest_eigenvalue
+from casysid.projection import ProjectionResult
 from casysid.robot import Robot
 from casysid.signals import Motion
 
@@ -33,9 +34,10 @@ class IdentificationResult:
         cutoff: The low-pass and why.
         regressor: Of which ``parameters`` are the coefficients.
         estimate: The unconstrained estimate.
-        parameters: The answer, shape (p,).
+        projection: How the estimate was made consistent; None when that was not asked for.
         structural: Base parameters of the mechanism.
         excited: Base parameters that the recordings show.
+        unconstrained: Torque error of the estimate before the projection, on the held-out recordings if there are any.
         train: Torque error on the fitted recordings.
         held_out: Torque error on recordings never fitted; None without any.
         file: Torque error of the file's own parameters, on the held-out recordings if there are any, else on the fitted ones.
@@ -49,9 +51,10 @@ class IdentificationResult:
     cutoff: CutoffChoice
     regressor: Regressor
     estimate: Estimate
-    parameters: Array
+    projection: ProjectionResult | None
     structural: BaseParameters
     excited: BaseParameters
+    unconstrained: TorqueError
     train: TorqueError
     held_out: TorqueError | None
     file: TorqueError
@@ -59,8 +62,10 @@ class IdentificationResult:
     held_out_motions: tuple[Motion, ...]
     seconds: Mapping[str, float] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "parameters", frozen(self.parameters))
+    @property
+    def parameters(self) -> Array:
+        """The answer, shape (p,): the projection's if there was one, else the estimate's."""
+        return self.estimate.parameters if self.projection is None else self.projection.parameters
 
     @property
     def status(self) -> Status:
@@ -143,6 +148,7 @@ class IdentificationResult:
             "relative_error": {
                 "train": self.train.relative,
                 "held_out": held_out.relative if held_out else None,
+                "unconstrained": self.unconstrained.relative,
                 "file": self.file.relative,
             },
             "relative_error_unfiltered": {
@@ -156,6 +162,7 @@ class IdentificationResult:
             },
             "physically_consistent": self.is_physically_consistent,
             "smallest_pseudo_inertia_eigenvalue": self.smallest_pseudo_inertia_eigenvalue,
+            "projection": _projection_to_json(self.projection),
             "base_parameters": {
                 "rank": self.structural.rank,
                 "condition_number": self.excited.condition_number,
@@ -167,6 +174,19 @@ class IdentificationResult:
             "diagnostics": dict(self.estimate.diagnostics),
         }
         return content
+
+
+def _projection_to_json(projection: ProjectionResult | None) -> dict[str, object] | None:
+    if projection is None:
+        return None
+    return {
+        "status": projection.status.value,
+        "solver": projection.solver.value,
+        "misfit": projection.misfit,
+        "gap": projection.gap,
+        "active": list(projection.active),
+        "iterations": projection.iterations,
+    }
 
 
 def without_infinities(value: object) -> object:

@@ -10,6 +10,7 @@ from casysid.dynamics import DEFAULT_FRICTION, Coupling, FrictionColumn
 from casysid.errors import ParameterError
 from casysid.estimation import Estimator, Ridge
 from casysid.inertia import Consistency
+from casysid.projection import Knowledge
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,6 +20,7 @@ class Settings:
     Attributes:
         method: The estimator.
         consistency: Physical laws that the parameters are made to obey; None leaves the estimate as it is.
+        knowledge: What is known beside the data, such as a total mass; used together with ``consistency``.
         cutoff: Low-pass cut-off [Hz]; None lets the data choose.
         friction: Kinds of friction and drive columns of every joint.
         coulomb_width: Velocity within which Coulomb's smooth sign turns [rad/s, m/s]; None takes it from the velocity's noise.
@@ -28,7 +30,8 @@ class Settings:
     """
 
     method: Estimator = field(default_factory=Ridge)
-    consistency: Consistency | None = None
+    consistency: Consistency | None = Consistency.FULL
+    knowledge: tuple[Knowledge, ...] = ()
     cutoff: float | None = None
     friction: tuple[FrictionColumn, ...] = DEFAULT_FRICTION
     coulomb_width: float | None = None

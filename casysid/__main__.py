@@ -1,0 +1,5 @@
+"""``python -m casysid``."""
+
+from casysid.cli import main
+
+main()

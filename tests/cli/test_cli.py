@@ -1,0 +1,126 @@
+"""The command line as a person meets it."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from casysid.bundled import find_model
+from casysid.cli.app import app
+from casysid.simulation import PlantSettings
+from tests.simulated import simulated_run
+
+URDF = str(find_model("two_link.urdf"))
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("logs") / "run.csv"
+    simulated_run("two_link.urdf", 0, PlantSettings()).recording.write(path)
+    return path
+
+
+def test_identify_writes_result_model_and_report(log, tmp_path):
+    out = tmp_path / "out"
+    answer = run("identify", URDF, log, "--split", "0.6", "--cutoff", "12", "--out", out)
+    assert answer.exit_code == 0, answer.output
+    assert answer.stdout.strip().endswith("result.json")
+    content = json.loads((out / "result.json").read_text())
+    assert content["relative_error"]["held_out"] < 0.15
+    assert "accepted" in answer.stderr
+    assert "<h1>" in (out / "report.html").read_text()
+    assert (out / "identified.urdf").exists()
+
+
+@pytest.mark.parametrize("method", ["ols", "wls", "stepwise", "tls"])
+def test_every_method_has_a_name(log, tmp_path, method):
+    answer = run("identify", URDF, log, "--split", "0.6", "--cutoff", "12", "--method", method, "--out", tmp_path)
+    assert answer.exit_code == 0, answer.output
+    assert json.loads((tmp_path / "result.json").read_text())["method"] == method
+
+
+def test_info_shows_robot_and_recording(log):
+    answer = run("info", URDF, log)
+    assert answer.exit_code == 0, answer.output
+    for word in ("Joints", "Links", "Identifiable combinations", "rate [Hz]", "noise (std)"):
+        assert word in answer.stdout
+
+
+def test_help_has_examples():
+    for verb in ("identify", "info"):
+        answer = run(verb, "--help")
+        assert answer.exit_code == 0
+        assert f"casysid {verb} arm" in " ".join(answer.stdout.split())
+
+
+def make_log(path, change):
+    rows = 200
+    time = np.arange(rows) * 0.01
+    columns = {"time": time, "q1": np.sin(time), "q2": np.cos(time), "tau1": np.sin(3 * time), "tau2": np.cos(2 * time)}
+    change(columns)
+    names = list(columns)
+    lines = [",".join(names)] + [",".join(f"{columns[name][k]}" for name in names) for k in range(rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def put(name, row, value):
+    def change(columns):
+        columns[name][row] = value
+
+    return change
+
+
+BAD_INPUT = {
+    "a robot that is not there": (["nowhere.urdf", "LOG"], "nowhere.urdf"),
+    "a log that is not there": ([URDF, "nowhere.csv"], "nowhere.csv"),
+    "an unknown method": ([URDF, "LOG", "--method", "magic"], "method must be one of"),
+    "a split above one": ([URDF, "LOG", "--split", "1.5"], "between 0 and 1"),
+    "a negative cut-off": ([URDF, "LOG", "--cutoff", "-3"], "positive number of Hz"),
+    "gravity that is not a number": ([URDF, "LOG", "--gravity", "0", "0", "nan"], "gravity"),
+    "an unknown joint to lock": ([URDF, "LOG", "--lock", "elbowww=0"], "elbowww"),
+    "a lock without a number": ([URDF, "LOG", "--lock", "joint_2"], "JOINT=VALUE"),
+    "a coupling of unknown joints": ([URDF, "LOG", "--coupling", "a+b"], "coupling"),
+    "a coupling of one joint": ([URDF, "LOG", "--coupling", "a"], "coupling"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_INPUT)
+def test_bad_input_gets_one_message_and_exit_code_2(case, tmp_path):
+    arguments, message = BAD_INPUT[case]
+    log = make_log(tmp_path / "log.csv", lambda columns: None)
+    out = tmp_path / "out"
+    answer = run("identify", *(log if word == "LOG" else word for word in arguments), "--out", out)
+    assert answer.exit_code == 2, answer.output
+    assert message in " ".join(answer.stderr.split())
+    assert "Traceback" not in answer.output
+    assert not out.exists()
+
+
+BAD_LOG = {
+    "not a number": (put("q1", 17, np.nan), "q1"),
+    "time running backwards": (put("time", 50, 0.1), "time"),
+    "a missing column": (lambda columns: columns.pop("tau2"), "tau"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_LOG)
+def test_bad_logs_are_refused_at_the_door(case, tmp_path):
+    change, message = BAD_LOG[case]
+    answer = run("identify", URDF, make_log(tmp_path / "log.csv", change), "--out", tmp_path / "out")
+    assert answer.exit_code == 2
+    assert message in answer.stderr
+    assert "log.csv" in " ".join(answer.stderr.split()).replace(" ", "")
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_module_runs_as_a_command():
+    answer = subprocess.run([sys.executable, "-m", "casysid", "--version"], capture_output=True, text=True, check=True)
+    assert answer.stdout.startswith("casysid 0.")

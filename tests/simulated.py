@@ -1,0 +1,36 @@
+"""Recordings of simulated robots, whose truth is known."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from casysid.bundled import find_model
+from casysid.robot import Robot
+from casysid.simulation import (
+    IDEAL,
+    ComputedTorque,
+    ControlModel,
+    PD,
+    Plant,
+    PlantSettings,
+    SimulatedRun,
+    design_sinusoids,
+    simulate,
+)
+
+RATE = 500.0
+
+
+@cache
+def bundled_robot(name: str) -> Robot:
+    return Robot.from_file(find_model(name))
+
+
+@cache
+def simulated_run(name: str, seed: int, settings: PlantSettings = IDEAL, duration: float = 8.0) -> SimulatedRun:
+    """The robot under computed torque with its true parameters along sinusoids of the seed."""
+    robot = bundled_robot(name)
+    plant = Plant(robot, settings)
+    control = ComputedTorque(ControlModel.from_robot(robot, plant.parameters), PD.tuned(robot, plant.parameters))
+    motion = design_sinusoids(robot, duration=duration, seed=seed)
+    return simulate(plant, control, motion, rate=RATE, duration=duration, seed=seed)
