@@ -1,0 +1,178 @@
+"""Coordinates in which the prior's links are bodies of about unit size.
+
+Links differ by orders of magnitude, and so do a link's mass and inertia. With a reference pseudo-inertia ``A Aᵀ`` near
+the prior's, ``P = A P' Aᵀ`` turns a link into one of about unit size, whatever the robot, its frames and its units.
+Distance to the prior is measured there, ``‖P' - P'_prior‖`` (Frobenius): the constant pull-back of the affine-invariant
+metric (Lee and Park 2018), which does not depend on the choice of link frames.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from casysid.arrays import Array, frozen
+from casysid.errors import CasysidWarning
+from casysid.inertia import (
+    CONSISTENCY_BASIS,
+    Consistency,
+    is_consistent,
+    mass_properties,
+    parameters_from_pseudo_inertia,
+    parameters_from_virtual,
+    pseudo_inertia,
+    smallest_eigenvalue,
+    virtual_from_parameters,
+)
+from casysid.projection.knowledge import Constraints
+from casysid.projection.layout import Layout
+from casysid.projection.misfit import DataMisfit
+
+BALL = 0.1
+"""Share of a ball of the link's mass and size in its reference, so that flat links do not divide by zero."""
+LIGHTEST = 1e-2
+"""A link's reference mass is at least this fraction of the robot's mean."""
+SMALLEST = 0.1
+"""A link's reference radius of gyration is at least this fraction of the robot's median."""
+LOUDEST = 100.0
+"""Effects of a single parameter are not believed to exceed the residuals by more than this factor."""
+NOTHING_KNOWN = (1.0, 0.1)
+"""Reference mass [kg] and radius of gyration [m] where the prior is empty."""
+ROUNDED = 1e-6
+"""Relative eigenvalues this far below zero are the model file's decimals, and no reason for a warning."""
+UNIT_BODY = frozen(parameters_from_pseudo_inertia(np.eye(4)))
+"""Parameters of the body whose pseudo-inertia is the unit matrix."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The change of coordinates ``θ = T φ``, and the prior in both.
+
+    Attributes:
+        transform: ``T``, shape (p, p), ten by ten blocks and a diagonal.
+        prior: ``θ_0``, consistent, at or above the floor, shape (p,).
+        scaled_prior: ``φ_0``, shape (p,).
+        strain: ``F``: ``‖F (φ - φ_0)‖`` is the distance to the prior, shape (p, p).
+    """
+
+    transform: Array
+    prior: Array
+    scaled_prior: Array
+    strain: Array
+
+    def __post_init__(self) -> None:
+        for name in ("transform", "prior", "scaled_prior", "strain"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+
+def frame_of(
+    layout: Layout, constraints: Constraints, misfit: DataMisfit, prior: Array, consistency: Consistency, floor: float
+) -> Frame:
+    """Coordinates and a consistent prior; warns when the prior had to be changed for that."""
+    bodies = _nearest_consistent(layout, constraints, prior, consistency)
+    factors = [_reference(*row, consistency) for row in zip(bodies, *_sizes(bodies), strict=True)]
+    blocks = [_congruence(factor) for factor in factors]
+    scalars = _scales(misfit, prior)[layout.inertial :]
+    transform = block_diag(*blocks, np.diag(scalars))
+    scaled = np.linalg.solve(transform, np.concatenate([bodies.ravel(), prior[layout.inertial :]]))
+    scaled = np.where(constraints.kept, scaled, feasible(layout, scaled, consistency, floor))
+    strain = block_diag(*[_frobenius()] * len(blocks), np.eye(len(scalars)))
+    return Frame(transform, np.where(constraints.kept, prior, transform @ scaled), scaled, strain)
+
+
+def feasible(layout: Layout, scaled: Array, consistency: Consistency, floor: float) -> Array:
+    """Scaled parameters (p,) that are nearly consistent made so, by adding the least share of a unit body."""
+    result = scaled.copy()
+    bodies = result[: layout.inertial].reshape(-1, 10)
+    lacking = np.maximum(-smallest_eigenvalue(bodies - floor * UNIT_BODY, consistency), 0.0)
+    bodies += lacking[:, None] * UNIT_BODY
+    single = list(layout.non_negative)
+    result[single] = np.maximum(result[single], 0.0)
+    return result
+
+
+def clipped(layout: Layout, scaled: Array, floor: float) -> Array:
+    """The nearest scaled parameters (p,) whose pseudo-inertias and single numbers are at or above the floor."""
+    result = scaled.copy()
+    bodies = result[: layout.inertial].reshape(-1, 10)
+    bodies[:] = _without_negatives(bodies - floor * UNIT_BODY) + floor * UNIT_BODY
+    single = list(layout.non_negative)
+    result[single] = np.maximum(result[single], floor)
+    return result
+
+
+def _without_negatives(bodies: Array) -> Array:
+    """The nearest bodies whose pseudo-inertia has no negative eigenvalue."""
+    return parameters_from_virtual(virtual_from_parameters(bodies))
+
+
+def _nearest_consistent(layout: Layout, constraints: Constraints, prior: Array, consistency: Consistency) -> Array:
+    """The prior's links (n, 10), those that are inconsistent replaced by the nearest that are."""
+    bodies = prior[: layout.inertial].reshape(-1, 10)
+    broken = ~is_consistent(bodies, consistency, tolerance=ROUNDED)
+    negative = [place for place in layout.non_negative if prior[place] < 0.0]
+    if broken.any() or negative:
+        names = [layout.links[link] for link in np.flatnonzero(broken)] + [layout.names[place] for place in negative]
+        kept = constraints.kept[: layout.inertial : 10] & broken
+        warnings.warn(
+            f"projection: the prior is not physically consistent at {', '.join(names)}; the nearest consistent values "
+            f"take its place{', but links to be kept stay as they are' if kept.any() else ''}",
+            CasysidWarning,
+            stacklevel=4,
+        )
+    scale = np.array([_congruence(_ball(body, *size)) for body, *size in zip(bodies, *_sizes(bodies), strict=True)])
+    unit = np.linalg.solve(scale, bodies[..., None])[..., 0] if len(bodies) else bodies
+    mended = np.einsum("nij,nj->ni", scale, _without_negatives(unit)) if len(bodies) else bodies
+    return np.where(is_consistent(bodies, consistency)[:, None], bodies, mended)
+
+
+def _sizes(bodies: Array) -> tuple[Array, Array]:
+    """Reference mass and radius of gyration of each link, (n,) and (n,), none of them zero."""
+    mass = np.maximum(bodies[:, 0], 0.0)
+    spread = np.trace(mass_properties(bodies).inertia, axis1=1, axis2=2) / 6.0  # tr Σ / 3 about the centre of mass
+    square = np.divide(spread, mass, out=np.zeros_like(mass), where=(mass > 0.0) & (spread > 0.0))
+    mean_mass = np.mean(mass) if mass.any() else NOTHING_KNOWN[0]
+    radius = np.sqrt(square)
+    median_radius = np.median(radius[radius > 0.0]) if radius.any() else NOTHING_KNOWN[1]
+    return np.maximum(mass, LIGHTEST * mean_mass), np.maximum(radius, SMALLEST * median_radius)
+
+
+def _ball(body: Array, mass: float, radius: float) -> Array:
+    """``A`` of a ball of the given mass and radius of gyration at the body's centre of mass."""
+    A = np.diag([radius, radius, radius, 1.0])
+    if is_consistent(body, Consistency.INERTIA, tolerance=ROUNDED):
+        A[:3, 3] = mass_properties(body).center_of_mass
+    return np.asarray(np.sqrt(mass) * A)
+
+
+def _reference(body: Array, mass: float, radius: float, consistency: Consistency) -> Array:
+    """``A`` of the link's reference: the prior's and some of a ball, or a ball alone where shears are not allowed."""
+    ball = _ball(body, mass, radius)
+    if consistency is not Consistency.FULL:
+        return ball
+    reference = pseudo_inertia(body) + BALL * ball @ ball.T
+    return np.asarray(np.linalg.cholesky(reference[::-1, ::-1])[::-1, ::-1])  # upper triangular
+
+
+def _congruence(factor: Array) -> Array:
+    """``T`` of ``P = A P' Aᵀ`` on parameters, shape (10, 10)."""
+    return parameters_from_pseudo_inertia(factor @ CONSISTENCY_BASIS[Consistency.FULL] @ factor.T).T
+
+
+def _frobenius() -> Array:
+    """``F``: ``‖F φ‖`` is the Frobenius norm of the pseudo-inertia of ``φ``, shape (10, 10)."""
+    row, column = np.triu_indices(4)
+    weight = np.where(row == column, 1.0, np.sqrt(2.0))
+    return np.asarray(CONSISTENCY_BASIS[Consistency.FULL][:, row, column] * weight).T
+
+
+def _scales(misfit: DataMisfit, prior: Array) -> Array:
+    """A size for every single parameter: of the prior, the estimate, and what would double the residual energy."""
+    strength = np.linalg.norm(misfit.seen, axis=0)
+    doubling = np.divide(1.0, strength, out=np.zeros_like(strength), where=strength > 0.0)
+    estimate = np.clip(np.abs(misfit.minimum), doubling, LOUDEST * doubling)
+    size = np.maximum(np.abs(prior), estimate)
+    return np.where(size > 0.0, size, 1.0)
