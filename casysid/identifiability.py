@@ -1,8 +1,10 @@
 """Which parameters can be known at all, which this recording shows, and in what combinations.
 
-Structure: the regressor at random states has a null space however rich the motion is. Columns are taken from the base to the tip;
-one that depends on those before it joins them, so that ``β = θ_independent + K θ_dependent`` are the base parameters (Gautier and
-Khalil 1990, numerical form Gautier 1991). Data: the same on the moments of a recording, where further directions may be too weak.
+Structure: the regressor at random states has a null space however rich the motion is. Columns are taken from the base
+    to the tip;
+one that depends on those before it joins them, so that ``β = θ_independent + K θ_dependent`` are the base parameters
+(Gautier and Khalil 1990, numerical form Gautier 1991). Data: the same on the moments of a recording, where further
+directions may be too weak.
 """
 
 from __future__ import annotations
@@ -122,7 +124,7 @@ def structural_base_parameters(regressor: Regressor, *, samples: int = 0, seed: 
 
 
 def excited_base_parameters(regressor: Regressor, moments: Moments, noise_std: Array) -> BaseParameters:
-    """Base parameters that a recording shows, its joints weighted by ``1/σ²``; ``noise_std`` of shape (joints,), [N m]."""
+    """Base parameters that a recording shows, joints weighted by ``1/σ²``; ``noise_std`` of shape (joints,), [N m]."""
     return base_parameters_of_gram(moments.pooled(noise_std**-2.0).xx, regressor.names)
 
 

@@ -1,8 +1,9 @@
 """Sufficient statistics of a linear regression: all that any estimator sees of the data.
 
-With rows ``r = [x, y]`` (``x`` a joint's row of the regressor, ``y`` its torque at one instant), the sums ``Σ r rᵀ`` per block of
-time and per joint are enough for least squares, ridge, errors in variables, the Bayesian de-noising EM, cross-validation over
-blocks, re-weighting between joints, and standard errors from blocks. They add: over blocks, recordings, processes, machines.
+With rows ``r = [x, y]`` (``x`` a joint's row of the regressor, ``y`` its torque at one instant), the sums ``Σ r rᵀ``
+per block of time and per joint are enough for least squares, ridge, errors in variables, the Bayesian de-noising EM,
+cross-validation over blocks, re-weighting between joints, and standard errors from blocks. They add: over blocks,
+recordings, processes, machines.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ class Moments:
     """Sums of ``r rᵀ``, ``r = [x, y]``, by block of time and by joint.
 
     Attributes:
-        gram: Shape (blocks, joints, p + 1, p + 1), symmetric in the last two axes; the last row and column belong to ``y``.
+        gram: Shape (blocks, joints, p + 1, p + 1), symmetric in the last two axes; the last row and column belong to
+            ``y``.
         count: Rows in each sum, shape (blocks, joints).
         columns: Names of the p regressor columns.
         joints: Names of the degrees of freedom whose torque rows were summed.
@@ -59,8 +61,8 @@ class Moments:
         width = len(self.columns) + 1
         if gram.ndim != 4 or gram.shape[1:] != (len(self.joints), width, width):
             raise ParameterError(
-                f"moments: gram must have shape (blocks, {len(self.joints)}, {width}, {width}) for {len(self.joints)} joints and "
-                f"{width - 1} columns; got {gram.shape}"
+                f"moments: gram must have shape (blocks, {len(self.joints)}, {width}, {width}) for {len(self.joints)} "
+                f"joints and {width - 1} columns; got {gram.shape}"
             )
         if count.shape != gram.shape[:2]:
             raise ParameterError(f"moments: count must have shape {gram.shape[:2]}; got {count.shape}")
@@ -73,7 +75,7 @@ class Moments:
     def from_rows(
         cls, x: npt.ArrayLike, y: npt.ArrayLike, *, columns: Sequence[str] | None = None, blocks: int = 1
     ) -> Moments:
-        """Moments of one plain regression problem, ``x`` of shape (N, p) and ``y`` of shape (N,), in contiguous blocks."""
+        """Moments of one regression problem, ``x`` of shape (N, p) and ``y`` of shape (N,), in contiguous blocks."""
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         if x.ndim != 2 or y.shape != x.shape[:1]:
             raise ParameterError(f"moments: x must be (N, p) and y (N,); got {x.shape} and {y.shape}")
@@ -117,7 +119,7 @@ class Moments:
         return Moments(gram, self.count, self.columns, self.joints)
 
     def pooled(self, weights: npt.ArrayLike | None = None) -> NormalEquations:
-        """Sum over blocks and joints, the rows of each joint multiplied by its weight ``1/σ²`` (shape (joints,), default 1)."""
+        """Sum over blocks and joints, each joint's rows weighted by ``1/σ²`` (shape (joints,), default 1)."""
         w = np.ones(len(self.joints)) if weights is None else np.asarray(weights, dtype=np.float64)
         total = np.einsum("j,jmn->mn", w, self.gram.sum(axis=0))
         return NormalEquations(

@@ -2,8 +2,8 @@
 
     python scripts/evaluate_real_robots.py --data DIR [--methods ols,wls,ridge] [--robots emps,...] [--json FILE]
 
-DIR holds a folder per robot with its URDF and recordings. What is known of a robot beforehand, such as a wrist whose motors drive
-two joints, is declared in the table below; nothing else is told.
+DIR holds a folder per robot with its URDF and recordings. What is known of a robot beforehand, such as a wrist whose
+motors drive two joints, is declared in the table below; nothing else is told.
 """
 
 from __future__ import annotations

@@ -35,7 +35,9 @@ def test_residual_energy_is_that_of_the_rows(seed):
     x, y = draw_rows(seed)
     theta = np.random.default_rng(seed + 7).normal(size=4)
     moments = Moments.from_rows(x, y, blocks=3)
-    truth = [[np.sum((yb - xb @ theta) ** 2)] for xb, yb in zip(np.array_split(x, 3), np.array_split(y, 3), strict=True)]
+    truth = [
+        [np.sum((yb - xb @ theta) ** 2)] for xb, yb in zip(np.array_split(x, 3), np.array_split(y, 3), strict=True)
+    ]
     assert np.allclose(moments.residual_energy(theta), truth)
     assert moments.pooled().residual_energy(theta) == pytest.approx(np.sum(truth))
 

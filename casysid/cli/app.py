@@ -14,7 +14,10 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode="rich",
-    help="Identify robot dynamics: from a URDF or MJCF and a log of joint positions and torques to a model a controller can trust.",
+    help=(
+        "Identify robot dynamics: from a URDF or MJCF and a log of joint positions and torques to a model "
+        "a controller can trust."
+    ),
     epilog="Exit codes: 0 done, 1 a solver failed but the result was written, 2 bad input.",
 )
 

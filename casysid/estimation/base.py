@@ -67,5 +67,5 @@ class Estimator(Protocol):
     name: ClassVar[str]
 
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
-        """Parameters that explain the moments; directions that the data cannot see stay at ``prior`` (zeros when None)."""
+        """Parameters that explain the moments; what the data cannot see stays at ``prior`` (zeros when None)."""
         ...

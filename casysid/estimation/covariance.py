@@ -1,9 +1,9 @@
 """Standard errors that survive coloured residuals.
 
 Residuals of a robot's torque are never white: friction, elasticity and the low-pass colour them, and the textbook
-``σ² (XᵀX)⁻¹`` is far too small. Scores summed over blocks of time carry that colour. One inflation factor by joint, the ratio of
-the scores' variance between blocks to what white residuals would give, pooled over all seen directions, is stable even when there
-are fewer blocks than parameters, where the plain sandwich would be singular.
+``σ² (XᵀX)⁻¹`` is far too small. Scores summed over blocks of time carry that colour. One inflation factor by joint, the
+ratio of the scores' variance between blocks to what white residuals would give, pooled over all seen directions, is
+stable even when there are fewer blocks than parameters, where the plain sandwich would be singular.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def block_covariance(moments: Moments, parameters: Array, weights: Array) -> Arr
 def _inflation(
     moments: Moments, parameters: Array, basis: Array, values: Array, white: Array, variance: Array
 ) -> Array:
-    """Variance of the blocks' scores over that of white residuals, by joint, never below one; ones for a single block."""
+    """Variance of the blocks' scores over white residuals', by joint, never below one; ones for a single block."""
     if moments.blocks < 2:
         return np.ones(len(variance))
     residual = np.append(-parameters, 1.0)

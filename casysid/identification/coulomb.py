@@ -1,8 +1,9 @@
 """How sharply Coulomb friction changes its sign, settled by the data.
 
-A step at zero velocity fits a stiff drive; a lubricated or elastic one changes over a band of slow motion. The width of the smooth
-sign enters nonlinearly, so a few widths are tried, each a whole small identification, and every joint takes the one that predicts
-its own torque best on blocks of time left out. All joints share a trial, because a joint's width acts on its own torque alone.
+A step at zero velocity fits a stiff drive; a lubricated or elastic one changes over a band of slow motion. The width of
+the smooth sign enters nonlinearly, so a few widths are tried, each a whole small identification, and every joint takes
+the one that predicts its own torque best on blocks of time left out. All joints share a trial, because a joint's width
+acts on its own torque alone.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from casysid.robot import Robot
 RELATIVE_WIDTHS = (3e-4, 1.5e-3, USUAL_WIDTH, 2e-2, 6e-2)
 """Candidates, in root mean square velocities of the joint."""
 WORTHWHILE_GAIN = 0.03
-"""The sharpest width is taken whose error is within this share of the best: a step is the model, a slope needs evidence."""
+"""The sharpest width within this share of the least error is taken: a step is the model, a slope needs evidence."""
 
 
 def choose_relative_width(

@@ -1,9 +1,10 @@
 """The low-pass cut-off, settled by the data.
 
-Every candidate is a whole small identification. Its score is the cross-validated torque error, each joint's relative to that
-joint's own torque seen through the same low-pass, and the geometric mean over joints: the band in which the rigid-body model
-explains the largest share of the torque. Too low a cut-off would remove motion and bias the parameters, which no later step can
-mend, so candidates begin at three times the frequency that holds 95 % of the velocity's energy.
+Every candidate is a whole small identification. Its score is the cross-validated torque error, each joint's relative to
+that joint's own torque seen through the same low-pass, and the geometric mean over joints: the band in which the
+rigid-body model explains the largest share of the torque. Too low a cut-off would remove motion and bias the
+parameters, which no later step can mend, so candidates begin at three times the frequency that holds 95 % of the
+velocity's energy.
 """
 
 from __future__ import annotations

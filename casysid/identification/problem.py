@@ -18,7 +18,7 @@ from casysid.robot import Robot
 from casysid.signals import Motion, motion_from_recording
 
 WIDTH_IN_NOISE = 3.0
-"""The smooth sign of Coulomb friction turns within no less than this many standard deviations of the velocity's noise."""
+"""Coulomb's smooth sign turns within no less than this many standard deviations of the velocity's noise."""
 USUAL_WIDTH = 5e-3
 """And, before the data have chosen, within this fraction of the root mean square velocity."""
 MINIMUM_BLOCKS = 4
@@ -82,7 +82,7 @@ def sum_moments(regressor: Regressor, motions: Sequence[Motion], settings: Setti
 
 
 def coulomb_width(motions: Sequence[Motion], relative_width: float | Array) -> Array:
-    """Velocity within which the sign of each degree of freedom's velocity turns, shape (nv,): never sharper than its noise."""
+    """Velocity within which each degree of freedom's smooth sign turns, shape (nv,): never sharper than its noise."""
     noise = np.max([motion.velocity_noise for motion in motions], axis=0)
     speed = np.sqrt(np.mean([np.mean(motion.v**2, axis=0) for motion in motions], axis=0))
     return np.asarray(np.maximum(np.maximum(WIDTH_IN_NOISE * noise, relative_width * speed), 1e-9))

@@ -40,7 +40,8 @@ class IdentificationResult:
         unconstrained: Torque error of the estimate before the projection, on the held-out recordings if there are any.
         train: Torque error on the fitted recordings.
         held_out: Torque error on recordings never fitted; None without any.
-        file: Torque error of the file's own parameters, on the held-out recordings if there are any, else on the fitted ones.
+        file: Torque error of the file's own parameters, on the held-out recordings if there are any, else on the fitted
+            ones.
         train_motions: The fitted motions.
         held_out_motions: The motions never fitted.
         seconds: Wall time of the stages by name.
@@ -117,7 +118,7 @@ class IdentificationResult:
         )
 
     def drive_parameters(self) -> dict[str, dict[str, float | None]]:
-        """Friction and armature by degree of freedom; None for a kind that is not in the model. Couplings go by their name."""
+        """Friction and armature by degree of freedom, couplings by name; None for a kind that is not in the model."""
         table: dict[str, dict[str, float | None]] = {dof: dict.fromkeys(JOINT_KINDS) for dof in self.robot.dofs}
         inertial = 10 * len(self.robot.links)
         for parameter, value in zip(self.regressor.parameters[inertial:], self.parameters[inertial:], strict=True):

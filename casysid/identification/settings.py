@@ -23,7 +23,8 @@ class Settings:
         knowledge: What is known beside the data, such as a total mass; used together with ``consistency``.
         cutoff: Low-pass cut-off [Hz]; None lets the data choose.
         friction: Kinds of friction and drive columns of every joint.
-        coulomb_width: Velocity within which Coulomb's smooth sign turns [rad/s, m/s]; None takes it from the velocity's noise.
+        coulomb_width: Velocity within which Coulomb's smooth sign turns [rad/s, m/s]; None takes it from the velocity's
+            noise.
         couplings: Transmissions that link joints, such as a wrist driven by two motors.
         blocks: Blocks of time by which moments are kept: the folds of cross-validation and the unit of standard errors.
         threads: Threads of the regressor's evaluation.

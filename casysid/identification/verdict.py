@@ -51,7 +51,7 @@ def _reasons(result: IdentificationResult) -> list[str]:
         reasons.append(f"The model explains nothing: its torque error is {error:.0%} of the torque.")
     if not error < result.file.relative:
         reasons.append(
-            f"The model file's own parameters predict better: {result.file.relative:.1%} against {error:.1%} torque error."
+            f"The model file's own parameters predict better: {result.file.relative:.1%} torque error, not {error:.1%}."
         )
     return reasons
 
@@ -68,7 +68,7 @@ def _remarks(result: IdentificationResult) -> list[str]:
         )
     if result.excited.condition_number > 1000.0:
         remarks.append(
-            f"The recordings excite weakly: condition number {result.excited.condition_number:.0f} (below 100 is good)."
+            f"The recordings excite weakly: condition number {result.excited.condition_number:.0f}, below 100 is good."
         )
     still = [
         dof

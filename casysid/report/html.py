@@ -69,8 +69,8 @@ def _sections(result: IdentificationResult) -> list[Section]:
     sections = [
         Section(
             "Torque error",
-            "‖measured − predicted‖ / ‖measured‖. Torque is seen through the same low-pass as the motion; the second line is "
-            "against the torque as logged.",
+            "‖measured − predicted‖ / ‖measured‖. Torque is seen through the same low-pass as the motion; the second "
+            "line is against the torque as logged.",
             table=error_table(result),
         ),
         Section(f"Torque on {shown} data", picture=inline_png(torque_figure(result))),

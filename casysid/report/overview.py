@@ -40,7 +40,7 @@ def _joints(robot: Robot) -> Table:
                 joint.name,
                 joint.kind.value,
                 joint.link or "–",
-                f"{number(float(robot.position_lower[channels][0]))} … {number(float(robot.position_upper[channels][0]))}",
+                " … ".join(number(float(x[channels][0])) for x in (robot.position_lower, robot.position_upper)),
                 number(float(robot.velocity_limit[joint.v][0])),
                 number(float(robot.effort_limit[joint.v][0])),
                 number(float(robot.damping[joint.v][0])),

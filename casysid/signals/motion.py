@@ -57,8 +57,8 @@ class Motion:
 def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | None) -> Motion:
     """The recording smoothed at ``cutoff`` [Hz] and differentiated; each stretch between gaps by itself.
 
-    Unordered samples (no time), and timed ones with ``cutoff`` None that carry velocity and acceleration, are taken as logged.
-    Logged velocities are otherwise not used: the spline's derivatives of the position are consistent with it by construction.
+    Unordered samples (no time), and timed ones with ``cutoff`` None that carry velocity and acceleration, are taken as
+    logged. Logged velocities are otherwise not used: the spline's derivatives of the position are consistent with it.
     """
     if recording.time is None or cutoff is None:
         return _as_logged(robot, recording)
@@ -82,8 +82,8 @@ def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | No
 def _as_logged(robot: Robot, recording: Recording) -> Motion:
     if recording.velocity is None or recording.acceleration is None:
         raise RecordingError(
-            f"{recording.label}: samples without a low-pass need velocity and acceleration in the log; add v_ and a_ columns, "
-            "or time stamps so that they can be differentiated"
+            f"{recording.label}: samples without a low-pass need velocity and acceleration in the log; add v_ and a_ "
+            "columns, or time stamps so that they can be differentiated"
         )
     count = len(recording.torque)
     return Motion(

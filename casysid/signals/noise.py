@@ -22,8 +22,8 @@ def _even_samples(time: Array, position: Array) -> tuple[Array, float]:
 def motion_band(time: Array, position: Array, share: float = 0.99) -> Array:
     """Frequency below which ``share`` of each channel's velocity energy lies [Hz], shape (n,), sensor noise left out.
 
-    The noise floor is the median of the position spectrum over its upper half; only lines four times above it count as motion.
-    A channel that never rises above its floor has band 0.
+    The noise floor is the median of the position spectrum over its upper half; only lines four times above it count as
+    motion. A channel that never rises above its floor has band 0.
     """
     even, rate = _even_samples(time, position)
     frequency, power = periodogram(even, rate, window="hann", detrend="linear", axis=0)
@@ -39,8 +39,8 @@ def position_noise(time: Array, position: Array) -> Array:
     """Standard deviation of position noise by channel, shape (n,), in the channel's unit.
 
     White noise is read from the upper half of the spectrum, where no motion is: the median of an exponentially
-    distributed periodogram is ``ln 2`` times its mean. A quantised sensor adds at least its step over √12 (Widrow 1956), which a slow motion
-    shows at low frequencies only.
+    distributed periodogram is ``ln 2`` times its mean. A quantised sensor adds at least its step over √12 (Widrow
+    1956), which a slow motion shows at low frequencies only.
     """
     even, rate = _even_samples(time, position)
     _, power = periodogram(even, rate, window="hann", detrend="linear", axis=0)
@@ -49,7 +49,7 @@ def position_noise(time: Array, position: Array) -> Array:
 
 
 def position_resolution(position: Array) -> Array:
-    """Quantisation step by channel, shape (n,), in the channel's unit; 0 where the values are not multiples of a step."""
+    """Quantisation step by channel, shape (n,), in the channel's unit; 0 where values are not multiples of a step."""
     return np.array([_step(channel) for channel in position.T])
 
 

@@ -1,9 +1,9 @@
 r"""Zero-phase low-pass and differentiation in one: the penalised smoothing spline.
 
-The spline ``x`` that minimises ``Σ (y_k - x(t_k))² + 1/(Δt ω_c^{2d}) ∫ (x^{(d)})² dt`` has, away from the ends, the gain
-``1 / (1 + (f/f_c)^{2d})``: that of a Butterworth filter of order ``d`` run forwards and backwards, half at the cut-off, with no phase.
-Unlike that filter it needs no even sampling, treats the ends by its natural boundary conditions, reproduces polynomials of degree
-below ``d`` exactly, and its derivatives are those of the spline itself.
+The spline ``x`` that minimises ``Σ (y_k - x(t_k))² + 1/(Δt ω_c^{2d}) ∫ (x^{(d)})² dt`` has, away from the ends, the
+gain ``1 / (1 + (f/f_c)^{2d})``: that of a Butterworth filter of order ``d`` run forwards and backwards, half at the
+cut-off, with no phase. Unlike that filter it needs no even sampling, treats the ends by its natural boundary
+conditions, reproduces polynomials of degree below ``d`` exactly, and its derivatives are those of the spline itself.
 
 Source: Craven and Wahba 1979 (smoothing splines), Eilers and Marx 1996 (penalised B-splines); the gain follows from the
 Euler-Lagrange equation ``x + (-1)^d ω_c^{-2d} x^{(2d)} = y``.
@@ -75,7 +75,8 @@ def build_smoother(time: Array, cutoff: float, order: int = 3) -> Smoother:
     """A smoother for samples at ``time`` [s] with the given cut-off [Hz].
 
     Raises:
-        ParameterError: Times do not increase, fewer samples than ``order + 1``, or a cut-off that is not positive and finite.
+        ParameterError: Times do not increase, fewer samples than ``order + 1``, or a cut-off that is not positive and
+            finite.
     """
     time = np.asarray(time, dtype=np.float64)
     if not (np.isfinite(cutoff) and cutoff > 0):
@@ -111,7 +112,7 @@ def _knots(time: Array, wanted_spacing: float, degree: int) -> tuple[Array, floa
 
 
 def derivative_basis(time: Array, knots: Array, degree: int, derivative: int) -> Any:
-    """Sparse matrix from B-spline coefficients to the ``derivative``-th derivative at ``time`` (de Boor 1978, ch. X eq. 15)."""
+    """Sparse matrix from coefficients to the ``derivative``-th derivative at ``time`` (de Boor 1978, ch. X eq. 15)."""
     lowered = degree - derivative
     inner = knots[derivative : len(knots) - derivative]
     inside = np.clip(time, inner[lowered], inner[-lowered - 1])

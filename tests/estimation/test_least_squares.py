@@ -79,7 +79,9 @@ def test_permuting_and_rescaling_columns_does_the_same_to_the_answer(method):
 def test_a_stronger_ridge_stays_closer_to_the_prior():
     moments, truth, _ = draw_problem(1)
     prior = truth + 1.0
-    distance = [np.linalg.norm(Ridge(strength=s).estimate(moments, prior).parameters - prior) for s in (1e-6, 1e-1, 1e3)]
+    distance = [
+        np.linalg.norm(Ridge(strength=s).estimate(moments, prior).parameters - prior) for s in (1e-6, 1e-1, 1e3)
+    ]
     assert distance[0] > distance[1] > distance[2]
     assert distance[2] < 0.05 * distance[0]
 
