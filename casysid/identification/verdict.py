@@ -63,8 +63,8 @@ def _remarks(result: IdentificationResult) -> list[str]:
     missing = result.structural.rank - result.excited.rank
     if missing > 0:
         remarks.append(
-            f"The recordings show {result.excited.rank} of the {result.structural.rank} base parameters; the others stay at "
-            "the model file's values. Move the joints more, and differently."
+            f"The recordings show {result.excited.rank} of the {result.structural.rank} base parameters; the others "
+            "stay at the model file's values. Move the joints more, and differently."
         )
     if result.excited.condition_number > 1000.0:
         remarks.append(
