@@ -100,7 +100,10 @@ def _chosen(valid: npt.ArrayLike | None, samples: int) -> npt.NDArray[np.intp]:
 
 def _require_finite(inputs: list[Array], chosen: npt.NDArray[np.intp]) -> None:
     for name, values in zip(("q", "v", "a", "tau"), inputs, strict=True):
-        bad = np.setdiff1d(chosen, np.flatnonzero(np.isfinite(values).all(axis=1)), assume_unique=True)
+        finite = np.isfinite(values)
+        if finite.all():
+            continue
+        bad = chosen[np.flatnonzero(~finite[chosen].all(axis=1))]
         if len(bad):
             raise ParameterError(
                 f"moments: {name} must be finite; {len(bad)} samples are not, the first is number {bad[0]}; "

@@ -101,15 +101,16 @@ def routes(robot: Robot, samples: int) -> dict[str, tuple[int, Callable[[], obje
     return table
 
 
-def compare(robot: Robot, samples: int, repeats: int) -> dict[str, float]:
-    """Best time of each route [µs per sample]."""
+def compare(robot: Robot, samples: int, repeats: int) -> dict[str, tuple[float, float]]:
+    """Best elapsed and best processor time (of all threads) of each route [µs per sample]."""
     table = routes(robot, samples)
-    best = dict.fromkeys(table, math.inf)
+    best = dict.fromkeys(table, (math.inf, math.inf))
     for _ in range(repeats):
         for name, (count, run) in table.items():
-            start = time.perf_counter()
+            start = time.perf_counter(), time.process_time()
             run()
-            best[name] = min(best[name], 1e6 * (time.perf_counter() - start) / count)
+            spent = time.perf_counter() - start[0], time.process_time() - start[1]
+            best[name] = min(best[name][0], 1e6 * spent[0] / count), min(best[name][1], 1e6 * spent[1] / count)
     return best
 
 
@@ -140,11 +141,11 @@ def main() -> None:
     result: dict[str, object] = {"samples": arguments.samples, "peak_memory_gb": peak_memory(arguments.samples)}
     for joints in (7, 10):
         times = compare(random_arm(joints), arguments.samples, arguments.repeats)
-        loop = min(value for name, value in times.items() if "loop" in name)
-        print(f"\n{joints} joints{'µs/sample':>34}{'times faster':>15}")
-        for name, value in times.items():
-            print(f"  {name:<32}{value:>8.2f}{loop / value:>15.1f}")
-        result[f"{joints} joints"] = times
+        loop, loop_cpu = (min(t[k] for name, t in times.items() if "loop" in name) for k in (0, 1))
+        print(f"\n{joints} joints, µs/sample{'elapsed':>18}{'times faster':>14}{'processor':>12}{'times less':>12}")
+        for name, (wall, cpu) in times.items():
+            print(f"  {name:<32}{wall:>8.2f}{loop / wall:>14.1f}{cpu:>12.2f}{loop_cpu / cpu:>12.1f}")
+        result[f"{joints} joints"] = {name: {"elapsed": wall, "processor": cpu} for name, (wall, cpu) in times.items()}
     print(f"\npeak memory, 10 joints, {arguments.samples} samples: {result['peak_memory_gb']:.2f} GB")
     if arguments.json:
         arguments.json.write_text(json.dumps(result, indent=2))
