@@ -1,0 +1,55 @@
+"""``casysid rehearse``: the whole experiment in simulation, where the truth is known."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from casysid.cli.options import FloatingOption, GravityOption, LockOption, RobotArgument, load_robot
+
+
+def rehearse(
+    robot: RobotArgument,
+    seed: Annotated[int, typer.Option(help="Of the hidden truth, the motions and the noise.")] = 0,
+    duration: Annotated[float, typer.Option(help="Of the recording to fit, and of the one held out [s].")] = 30.0,
+    rate: Annotated[float, typer.Option(help="Of controller and log [Hz].")] = 500.0,
+    method: Annotated[str | None, typer.Option(help="Estimator, as in casysid identify.")] = None,
+    gravity: GravityOption = None,
+    lock: LockOption = None,
+    floating_base: FloatingOption = False,
+    out: Annotated[Path, typer.Option(help="Folder for rehearsal.json, pictures, report and identified model.")] = Path(
+        "rehearsed"
+    ),
+) -> None:
+    """Rehearse the identification of ROBOT on a simulated machine that differs from its file."""
+    from casysid.cli.console import SOLVER_FAILED, progress_bar, rich_table, speaking
+
+    with speaking() as console:
+        from casysid.estimation import Status, estimator_by_name
+        from casysid.identification import Settings
+        from casysid.report import write_report
+        from casysid.report.rehearsal_pictures import write_rehearsal_pictures
+        from casysid.report.validation_tables import rehearsal_tables
+        from casysid.validation import RehearsalSettings, write_rehearsal
+        from casysid.validation import rehearse as run
+
+        identification = Settings(method=estimator_by_name(method)) if method else Settings()
+        settings = RehearsalSettings(duration=duration, rate=rate, seed=seed, identification=identification)
+        model = load_robot(robot, gravity, lock, floating_base)
+        with progress_bar(console) as progress:
+            rehearsal = run(model, settings, progress)
+            progress("write", 0.0)
+            notes = write_rehearsal(rehearsal, out)
+            write_report(rehearsal.result, out / "report.html")
+            pictures = write_rehearsal_pictures(rehearsal, out)
+        for title, table in rehearsal_tables(rehearsal):
+            console.print(rich_table(title, table.header, table.rows))
+            console.print()
+        for line in (*notes, *(f"picture: {path}" for path in pictures)):
+            console.print(f"  · {line}", markup=False, soft_wrap=True)
+        typer.echo(str(out / "rehearsal.json"))
+    if rehearsal.result.status is not Status.CONVERGED:
+        sys.exit(SOLVER_FAILED)

@@ -1,0 +1,52 @@
+"""``casysid validate``: a model file's own parameters judged on recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from casysid.cli.options import FloatingOption, GravityOption, LockOption, LogsArgument, RobotArgument, load_robot
+
+
+def validate(
+    robot: RobotArgument,
+    logs: LogsArgument,
+    result: Annotated[
+        Path | None,
+        typer.Option(
+            "--result",
+            metavar="FILE",
+            help="A result.json: its friction, offset, armature and cut-off. URDF has no place for armature.",
+        ),
+    ] = None,
+    cutoff: Annotated[
+        float | None, typer.Option(help="Low-pass cut-off [Hz]; default: the result's, else chosen by the data.")
+    ] = None,
+    gravity: GravityOption = None,
+    lock: LockOption = None,
+    floating_base: FloatingOption = False,
+    out: Annotated[Path, typer.Option(help="Folder for validation.json.")] = Path("validated"),
+) -> None:
+    """Predict the torque of recordings by ROBOT's own parameters; nothing is fitted."""
+    from casysid.cli.console import progress_bar, rich_table, speaking
+
+    with speaking() as console:
+        from casysid.identification.output import write_json
+        from casysid.recording import read_recordings
+        from casysid.report.validation_tables import validation_tables
+        from casysid.validation import read_drives
+        from casysid.validation import validate as run
+
+        model = load_robot(robot, gravity, lock, floating_base)
+        recordings = read_recordings(logs, model)
+        drives, filtered = read_drives(result) if result else (None, None)
+        with progress_bar(console) as progress:
+            validation = run(model, recordings, drives=drives, cutoff=cutoff or filtered, progress=progress)
+        out.mkdir(parents=True, exist_ok=True)
+        write_json(validation.to_json(), out / "validation.json")
+        for title, table in validation_tables(validation):
+            console.print(rich_table(title, table.header, table.rows))
+            console.print()
+        typer.echo(str(out / "validation.json"))
