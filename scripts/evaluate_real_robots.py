@@ -21,7 +21,7 @@ from rich.table import Table
 
 from casysid.dynamics import Coupling
 from casysid.estimation import estimator_by_name
-from casysid.identification import IdentificationResult, Settings, identify
+from casysid.identification import Preparation, Settings, compare, prepare
 from casysid.inertia import Consistency
 from casysid.recording import read_recording
 from casysid.robot import Robot
@@ -67,19 +67,17 @@ TRIALS = (
 )
 
 
-def run_trial(data: Path, trial: Trial, settings: Settings) -> IdentificationResult:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        robot = Robot.from_file(data / trial.folder / trial.urdf)
-        fitted, held_out = (
-            [read_recording(data / trial.folder / f"{name}.csv.gz", robot) for name in names]
-            for names in (trial.fitted, trial.held_out)
-        )
-        if not held_out:
-            (whole,) = fitted
-            first, second = whole.split(0.6)
-            fitted, held_out = [first], [second]
-        return identify(robot, fitted, settings, held_out=held_out)
+def prepare_trial(data: Path, trial: Trial, settings: Settings) -> Preparation:
+    robot = Robot.from_file(data / trial.folder / trial.urdf)
+    fitted, held_out = (
+        [read_recording(data / trial.folder / f"{name}.csv.gz", robot) for name in names]
+        for names in (trial.fitted, trial.held_out)
+    )
+    if not held_out:
+        (whole,) = fitted
+        first, second = whole.split(0.6)
+        fitted, held_out = [first], [second]
+    return prepare(robot, fitted, settings, held_out=held_out)
 
 
 def main() -> None:
@@ -90,22 +88,29 @@ def main() -> None:
     parser.add_argument("--robots", default=",".join(trial.folder for trial in TRIALS))
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
-    methods, chosen = arguments.methods.split(","), arguments.robots.split(",")
+    methods = [estimator_by_name(name) for name in arguments.methods.split(",")]
+    chosen = arguments.robots.split(",")
     consistency = None if arguments.consistency == "none" else Consistency(arguments.consistency)
     console, figures = Console(), {}
     table = Table(title=f"held-out relative torque error, consistency {arguments.consistency}")
-    for header in ("robot", "plain WLS, tuned", "cut-off [Hz]", *methods, "best / plain", "model file", "seconds"):
+    for header in (
+        "robot",
+        "plain WLS, tuned",
+        "cut-off [Hz]",
+        *(method.name for method in methods),
+        "best / plain",
+        "model file",
+        "seconds",
+    ):
         table.add_column(header, justify="left" if header == "robot" else "right")
     for trial in track([one for one in TRIALS if one.folder in chosen], console=Console(stderr=True), transient=True):
         started = time.perf_counter()
-        results = {}
-        cutoff = None
-        for name in methods:
-            settings = Settings(
-                method=estimator_by_name(name), consistency=consistency, couplings=trial.couplings, cutoff=cutoff
-            )
-            results[name] = run_trial(arguments.data, trial, settings)
-            cutoff = results[name].cutoff.cutoff
+        settings = Settings(consistency=consistency, couplings=trial.couplings)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            preparation = prepare_trial(arguments.data, trial, settings)
+            comparison = compare(preparation, methods, settings)
+        results, cutoff = comparison.results, preparation.cutoff.cutoff
         seconds = time.perf_counter() - started
         errors = {name: result.held_out.relative for name, result in results.items()}
         best, any_result = min(errors.values()), next(iter(results.values()))
@@ -123,7 +128,7 @@ def main() -> None:
             trial.folder,
             f"{trial.anchor:.3f}",
             f"{cutoff:.3g}",
-            *(f"{error:.4f}" for error in errors.values()),
+            *(f"{errors[method.name]:.4f}" if method.name in errors else "–" for method in methods),
             f"{best / trial.anchor:.2f}",
             f"{any_result.file.relative:.3f}",
             f"{seconds:.1f}",

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from casysid.cli.compare import compare
 from casysid.cli.identify import identify
 from casysid.cli.info import info
 
@@ -43,6 +44,7 @@ app.command(
     epilog="Examples: casysid identify arm.urdf excite.csv --split 0.6 --out identified  ·  "
     "casysid identify arm.xml run1.csv run2.parquet --held-out run3.csv"
 )(identify)
+app.command(epilog="Example: casysid compare arm.urdf excite.csv --split 0.6 --methods wls,ridge,lasso")(compare)
 app.command(epilog="Examples: casysid info arm.urdf  ·  casysid info arm.urdf excite.csv.gz")(info)
 
 

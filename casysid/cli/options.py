@@ -1,19 +1,42 @@
-"""Arguments that several verbs share."""
+"""Arguments that several verbs share, and what they stand for."""
 
 from __future__ import annotations
 
+import enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
+    from casysid.identification import Settings
+    from casysid.recording import Recording
     from casysid.robot import Robot
 
-RobotArgument = Annotated[
-    str, typer.Argument(metavar="ROBOT", help="URDF or MJCF file, or the name of a bundled model.")
-]
+
+class ConsistencyChoice(enum.StrEnum):
+    """Words of ``--consistency``."""
+
+    NONE = "none"
+    INERTIA = "inertia"
+    FULL = "full"
+
+
+RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="URDF or MJCF file, or a bundled model's name.")]
 LogsArgument = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings: CSV, CSV.gz, Parquet or NPZ.")]
+HeldOutOption = Annotated[
+    list[Path] | None,
+    typer.Option("--held-out", metavar="LOG", help="A recording to predict, never fitted. Repeatable."),
+]
+SplitOption = Annotated[
+    float | None, typer.Option(help="Fit on this first share of each recording's time, hold out the rest.")
+]
+ConsistencyOption = Annotated[ConsistencyChoice, typer.Option(help="Physical laws that the answer is made to obey.")]
+CutoffOption = Annotated[float | None, typer.Option(help="Low-pass cut-off [Hz]; default: chosen by the data.")]
+CouplingOption = Annotated[
+    list[str] | None,
+    typer.Option(metavar="JOINT+JOINT", help="A motor that turns with the sum of two joints' motions. Repeatable."),
+]
 GravityOption = Annotated[
     tuple[float, float, float] | None,
     typer.Option("--gravity", metavar="X Y Z", help="Gravity in the base frame [m/s²]; default: the model's."),
@@ -34,6 +57,40 @@ def load_robot(
     from casysid.robot import Robot
 
     return Robot.from_file(find_model(name), gravity=gravity, floating_base=floating_base, locked=_locked(lock or []))
+
+
+def load_recordings(
+    robot: Robot, logs: list[Path], held_out: list[Path] | None, split: float | None
+) -> tuple[list[Recording], list[Recording]]:
+    """The fitted and the held-out recordings."""
+    from casysid.errors import ParameterError
+    from casysid.recording import read_recordings
+
+    if split is not None and not 0.0 < split < 1.0:
+        raise ParameterError(f"--split wants a share of time between 0 and 1, such as 0.6; got {split}")
+    fitted, unseen = list(read_recordings(logs, robot)), list(read_recordings(held_out or [], robot))
+    if split is None:
+        return fitted, unseen
+    halves = [recording.split(split) for recording in fitted]
+    return [first for first, _ in halves], [second for _, second in halves] + unseen
+
+
+def make_settings(
+    method: str, consistency: ConsistencyChoice, cutoff: float | None, couplings: list[str] | None
+) -> Settings:
+    """Settings from the command line's words."""
+    from casysid.dynamics import Coupling
+    from casysid.estimation import estimator_by_name
+    from casysid.identification import Settings
+    from casysid.inertia import Consistency
+
+    pairs = [tuple(text.split("+")) for text in couplings or []]
+    return Settings(
+        method=estimator_by_name(method),
+        consistency=None if consistency is ConsistencyChoice.NONE else Consistency(consistency.value),
+        cutoff=cutoff,
+        couplings=tuple(Coupling(joints=joints, weights=(1.0,) * len(joints)) for joints in pairs),
+    )
 
 
 def _locked(pairs: list[str]) -> dict[str, float]:

@@ -1,19 +1,25 @@
 """The pipeline: recordings in, identified parameters with their check out."""
 
+from casysid.identification.comparison import Comparison, compare
 from casysid.identification.cutoff import CutoffChoice, choose_cutoff
 from casysid.identification.links import LinkProperties
-from casysid.identification.pipeline import identify
+from casysid.identification.pipeline import Preparation, identify, prepare, solve
 from casysid.identification.prediction import TorqueError, torque_error
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 
 __all__ = [
+    "Comparison",
     "CutoffChoice",
     "IdentificationResult",
     "LinkProperties",
+    "Preparation",
     "Settings",
     "TorqueError",
     "choose_cutoff",
+    "compare",
     "identify",
+    "prepare",
+    "solve",
     "torque_error",
 ]

@@ -1,16 +1,17 @@
-"""From recordings to identified parameters."""
+"""From recordings to identified parameters: prepare once, solve as often as there are methods to try."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import RecordingError
 from casysid.estimation import Estimate
-from casysid.identifiability import excited_base_parameters, structural_base_parameters
+from casysid.identifiability import BaseParameters, excited_base_parameters, structural_base_parameters
 from casysid.identification.coulomb import choose_relative_width
 from casysid.identification.cutoff import COARSE_STEP, FINE_STEP, CutoffChoice, choose_cutoff
 from casysid.identification.prediction import torque_error
@@ -20,14 +21,35 @@ from casysid.identification.settings import Settings
 from casysid.projection import ProjectionResult, build_projection, project
 from casysid.recording import Recording
 from casysid.robot import Robot
-from casysid.signals import motion_from_recording
+from casysid.signals import Motion, motion_from_recording
 
 Progress = Callable[[str, float], None]
 """Told the stage and the share of it that is done."""
 
 
-def _silent(stage: str, share: float) -> None:
+def silent(stage: str, share: float) -> None:
     """No progress."""
+
+
+@dataclass(frozen=True, eq=False)
+class Preparation:
+    """All that is read from the data: what every estimator starts from.
+
+    Attributes:
+        robot: The robot.
+        cutoff: The low-pass and why.
+        problem: Regressor, motions and moments of the fitted recordings.
+        held_out: Motions that are only predicted.
+        structural: Base parameters of the mechanism.
+        seconds: Wall time by stage.
+    """
+
+    robot: Robot
+    cutoff: CutoffChoice
+    problem: LinearProblem
+    held_out: tuple[Motion, ...]
+    structural: BaseParameters
+    seconds: dict[str, float]
 
 
 def identify(
@@ -36,7 +58,7 @@ def identify(
     settings: Settings | None = None,
     *,
     held_out: Sequence[Recording] = (),
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> IdentificationResult:
     """Identify a robot's parameters from recordings.
 
@@ -49,8 +71,23 @@ def identify(
 
     Raises:
         RecordingError: No recordings.
+        SolverError: No consistent parameters could be found.
     """
     settings = settings or Settings()
+    return solve(
+        prepare(robot, recordings, settings, held_out=held_out, progress=progress), settings, progress=progress
+    )
+
+
+def prepare(
+    robot: Robot,
+    recordings: Recording | Sequence[Recording],
+    settings: Settings,
+    *,
+    held_out: Sequence[Recording] = (),
+    progress: Progress = silent,
+) -> Preparation:
+    """Settle cut-off and friction's sharpness, and take the moments; arguments as in :func:`identify`."""
     fitted = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     if not fitted:
         raise RecordingError("identify: at least one recording to fit is needed; got none")
@@ -59,42 +96,45 @@ def identify(
     clock.lap("tuning")
     progress("moments", 0.0)
     problem = build_problem(robot, fitted, cutoff.cutoff, settings, relative_width=width)
+    unseen = tuple(motion_from_recording(robot, recording, cutoff.cutoff) for recording in held_out)
+    structural = structural_base_parameters(problem.regressor)
     clock.lap("moments")
+    progress("moments", 1.0)
+    return Preparation(robot, cutoff, problem, unseen, structural, clock.laps)
+
+
+def solve(preparation: Preparation, settings: Settings, *, progress: Progress = silent) -> IdentificationResult:
+    """Estimate, make consistent, and check: everything after the data have been read."""
+    problem, regressor = preparation.problem, preparation.problem.regressor
+    clock = _Clock()
     progress("estimate", 0.0)
-    regressor = problem.regressor
     estimate = settings.method.estimate(problem.moments, regressor.prior)
     clock.lap("estimate")
+    progress("estimate", 1.0)
     projection = _project(problem, estimate, settings, progress)
     clock.lap("projection")
     progress("check", 0.0)
     parameters = estimate.parameters if projection is None else projection.parameters
-    held_out_motions = tuple(motion_from_recording(robot, recording, cutoff.cutoff) for recording in held_out)
-    judged = held_out_motions or problem.motions
-    structural = structural_base_parameters(regressor)
-    excited = excited_base_parameters(regressor, problem.moments, estimate.noise_std)
-    train = torque_error(regressor, parameters, problem.motions)
-    unseen = torque_error(regressor, parameters, held_out_motions) if held_out_motions else None
-    unconstrained = torque_error(regressor, estimate.parameters, judged)
-    file = torque_error(regressor, regressor.prior, judged)
-    clock.lap("check")
-    progress("check", 1.0)
-    return IdentificationResult(
-        robot=robot,
+    judged = preparation.held_out or problem.motions
+    result = IdentificationResult(
+        robot=preparation.robot,
         settings=settings,
-        cutoff=cutoff,
+        cutoff=preparation.cutoff,
         regressor=regressor,
         estimate=estimate,
         projection=projection,
-        structural=structural,
-        excited=excited,
-        unconstrained=unconstrained,
-        train=train,
-        held_out=unseen,
-        file=file,
+        structural=preparation.structural,
+        excited=excited_base_parameters(regressor, problem.moments, estimate.noise_std),
+        unconstrained=torque_error(regressor, estimate.parameters, judged),
+        train=torque_error(regressor, parameters, problem.motions),
+        held_out=torque_error(regressor, parameters, preparation.held_out) if preparation.held_out else None,
+        file=torque_error(regressor, regressor.prior, judged),
         train_motions=problem.motions,
-        held_out_motions=held_out_motions,
-        seconds=clock.laps,
+        held_out_motions=preparation.held_out,
+        seconds={**preparation.seconds, **clock.laps},
     )
+    progress("check", 1.0)
+    return result
 
 
 def _project(
@@ -105,15 +145,16 @@ def _project(
         return None
     progress("projection", 0.0)
     regressor = problem.regressor
-    projection = build_projection(regressor.parameters, consistency=settings.consistency, knowledge=settings.knowledge)
     weighted = problem.moments.pooled(estimate.noise_std**-2.0)
-    return project(
-        projection,
+    projection = project(
+        build_projection(regressor.parameters, consistency=settings.consistency, knowledge=settings.knowledge),
         estimate.parameters,
         estimate.metric,
         regressor.prior,
         residual_energy=weighted.residual_energy(estimate.parameters),
     )
+    progress("projection", 1.0)
+    return projection
 
 
 def _settle(
@@ -121,8 +162,7 @@ def _settle(
 ) -> tuple[CutoffChoice, Array]:
     """Cut-off and sharpness of Coulomb friction, each chosen given the other; first roughly, then finely."""
     width: float | Array = USUAL_WIDTH
-    for step in (COARSE_STEP, FINE_STEP):
-        pace = "rough" if step == COARSE_STEP else "fine"
+    for pace, step in (("rough", COARSE_STEP), ("fine", FINE_STEP)):
         cutoff = choose_cutoff(
             robot,
             recordings,
