@@ -32,14 +32,16 @@ class Block(ABC):
         lower: Shape (m,).
         upper: Shape (m,).
         scale: What a violation is large or small against, shape (m,).
+        dense: Whether it can be violated and kept again within a short time.
     """
 
-    kind: ClassVar[str]
+    kind: str
     labels: tuple[str, ...]
     units: tuple[str, ...]
     lower: Array
     upper: Array
     scale: Array
+    dense: ClassVar[bool] = False
 
     @abstractmethod
     def measure(self, motion: Motion) -> Array:
@@ -131,7 +133,7 @@ class TorqueBlock(Block):
     parameters: Array
     joints: npt.NDArray[np.intp]
     limit: Array
-    _mapped: dict[int, Mapped] = field(default_factory=dict, repr=False)
+    _mapped: dict[tuple[str, int], Mapped] = field(default_factory=dict, repr=False)
 
     kind: ClassVar[str] = "torque"
 
@@ -167,12 +169,12 @@ class TorqueBlock(Block):
 
     def constrain(self, motion: Motion) -> Array:
         """Shares of the limits."""
-        return np.asarray(self._evaluate(motion)[:, : len(self.joints)] / self.limit)
+        return np.asarray(self._at("torque", motion) / self.limit)
 
     def slopes(self, motion: Motion) -> Slopes:
         """From the symbolic torque."""
         m, n = len(self.joints), len(self.regressor.robot.dofs)
-        values = self._evaluate(motion)[:, m:]
+        values = self._at("slopes", motion)
         full = np.zeros((len(values), m, 3 * n))
         rows, columns = self._pattern
         full[:, rows, columns] = values / self.limit[rows]
@@ -187,11 +189,17 @@ class TorqueBlock(Block):
         table[rows, columns % n] = True
         return table
 
-    def _evaluate(self, motion: Motion) -> Array:
-        samples = len(motion.position)
-        if samples not in self._mapped:
-            self._mapped[samples] = Mapped(self._symbolic[0], samples)
-        return self._mapped[samples](motion.position, motion.velocity, motion.acceleration)
+    def watching(self, wanted: npt.NDArray[np.bool_]) -> TorqueBlock | None:
+        """The same for fewer joints, chosen by a mask (m,); None for none."""
+        if wanted.all():
+            return self
+        return TorqueBlock(self.regressor, self.parameters, self.joints[wanted], self.limit[wanted]) if wanted.any() else None
+
+    def _at(self, name: str, motion: Motion) -> Array:
+        key = name, len(motion.position)
+        if key not in self._mapped:
+            self._mapped[key] = Mapped(self._symbolic[0][name], key[1])
+        return self._mapped[key](motion.position, motion.velocity, motion.acceleration)
 
     @property
     def _pattern(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
@@ -199,15 +207,18 @@ class TorqueBlock(Block):
         return rows, columns
 
     @cached_property
-    def _symbolic(self) -> tuple[Any, Any]:
-        """``(position, velocity, acceleration) -> torques and nonzeros of their Jacobian``, and its sparsity."""
+    def _symbolic(self) -> tuple[dict[str, Any], Any]:
+        """``(position, velocity, acceleration)`` to the torques and to their Jacobian's nonzeros, and its sparsity."""
         robot = self.regressor.robot
         p, v, a = (ca.SX.sym(name, robot.nv) for name in "pva")
         tau = self.regressor.torque(configuration(robot, p), v, a, ca.DM(self.parameters))
         tau = ca.vertcat(*(tau[int(k)] for k in self.joints))
         jacobian = ca.jacobian(tau, ca.vertcat(p, v, a))
-        values = ca.densify(ca.vertcat(tau, *jacobian.nonzeros()))
-        return ca.Function("limited_torque", [p, v, a], [values], {"cse": True}), jacobian.sparsity()
+        outputs = {"torque": ca.densify(tau), "slopes": ca.vertcat(*jacobian.nonzeros())}
+        functions = {
+            name: ca.Function(name, [p, v, a], [value], {"cse": True}) for name, value in outputs.items()
+        }
+        return functions, jacobian.sparsity()
 
 
 def joint_block(robot: Robot, order: int, lower: Array, upper: Array) -> JointBlock | None:

@@ -37,6 +37,7 @@ class ClearanceBlock(Block):
     reach: float
 
     kind: ClassVar[str] = "distance"
+    dense: ClassVar[bool] = True
 
     @property
     def labels(self) -> tuple[str, ...]:  # type: ignore[override]

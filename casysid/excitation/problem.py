@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -21,8 +19,7 @@ from casysid.excitation.clearance import Obstacle, build_clearance
 from casysid.excitation.criteria import Criterion, DOptimal
 from casysid.excitation.information import Information, column_scale
 from casysid.excitation.limits import JointLimits, limits_of
-from casysid.excitation.program import Evaluation
-from casysid.excitation.series import ExcitationTrajectory, FourierSeries, Motion, check_joints
+from casysid.excitation.series import ExcitationTrajectory, FourierSeries, Motion, check_joints, state_of
 from casysid.identifiability import structural_base_parameters
 from casysid.robot import Robot
 
@@ -30,8 +27,6 @@ COULOMB_SHARE = 0.03
 """Width of the smooth sign of Coulomb friction, as a share of the velocity limit."""
 NOISE_SHARE = 0.01
 """Torque noise where none is given, as a share of the effort limit, or of the largest torque expected."""
-FLOOR = 1e-9
-"""Information per sample that no parameter is below, in the scaled units: keeps matrices invertible."""
 SAMPLES_PER_HARMONIC = 24
 """Instants of the design grid in a period of the highest harmonic."""
 REFINEMENT = 10
@@ -55,7 +50,6 @@ class ExcitationProblem:
         samples: Instants of the design grid.
         start: Positions to start from, shape (n,); None leaves them to the design.
         notes: What was assumed or left out, in words.
-        seed: Of the random configurations that judged pairs of links.
     """
 
     robot: Robot
@@ -70,27 +64,16 @@ class ExcitationProblem:
     samples: int
     start: Array | None
     notes: tuple[str, ...] = ()
-    _cache: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def measured(self) -> float:
         """Samples in the whole recording."""
         return self.rate * self.series.period * self.periods
 
-    @cached_property
-    def evaluation(self) -> Evaluation:
-        """Objective and constraints on the design grid."""
-        return Evaluation(
-            series=self.series,
-            samples=self.samples,
-            unit=self.limits.half_range,
-            information=self.information,
-            known=self.known,
-            weight=self.measured / self.samples,
-            floor=FLOOR * self.measured,
-            criterion=self.criterion,
-            blocks=self.blocks,
-        )
+    def variables(self, trajectory: ExcitationTrajectory) -> Array:
+        """The design's variables of a trajectory, shape (n (1 + series.size),)."""
+        values = np.column_stack([trajectory.start, trajectory.coordinates])
+        return np.asarray(values / self.limits.half_range[:, None]).ravel()
 
     def trajectory(self, x: Array) -> ExcitationTrajectory:
         """Of the design's variables."""
@@ -139,7 +122,7 @@ def build_excitation(
     torque_noise: npt.ArrayLike | None = None,
     capsules: Sequence[Capsule] | None = None,
     obstacles: Sequence[Obstacle] = (),
-    clearance: float | None = 0.02,
+    clearance: float | None = 0.01,
     keep_in: Sequence[KeepInBlock] = (),
     start: npt.ArrayLike | None = None,
     samples: int | None = None,
@@ -289,8 +272,6 @@ def _noise(robot: Robot, regressor: Regressor, theta: Array, states: Motion, giv
         if not (np.isfinite(noise).all() and (noise > 0.0).all()):
             raise ParameterError(f"excitation: torque noise must be positive and finite; got {given}")
         return frozen(noise)
-    from casysid.excitation.series import state_of
-
     expected = np.abs(regressor.predict(theta, *state_of(robot, states))).max(axis=0)
     largest = np.where(np.isfinite(robot.effort_limit), robot.effort_limit, expected)
     return frozen(NOISE_SHARE * np.where(largest > 0.0, largest, 1.0))

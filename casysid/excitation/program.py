@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
@@ -12,61 +11,61 @@ import numpy.typing as npt
 
 from casysid.arrays import Array
 from casysid.excitation.blocks import Block
-from casysid.excitation.criteria import Criterion
-from casysid.excitation.information import Information
 from casysid.excitation.series import ORDERS, FourierSeries, Motion
 from casysid.nlp import HessianKind, NlpSettings, NonlinearProgram, build_nlp
 
+if TYPE_CHECKING:
+    from casysid.excitation.problem import ExcitationProblem
 
-@dataclass(eq=False, kw_only=True)
+FLOOR = 1e-9
+"""Information per sample that no parameter is below, in the scaled units: keeps matrices invertible."""
+
+
+class Grid:
+    """Instants, and the variables' basis functions there."""
+
+    def __init__(self, series: FourierSeries, time: Array, unit: Array) -> None:
+        """Of one period."""
+        ones = np.ones((len(time), 1))
+        self.size, self._unit = len(time), unit
+        self.basis = [np.hstack([ones * (order == 0), series.basis(time, order)]) for order in range(ORDERS)]
+
+    def motion(self, x: Array) -> Motion:
+        """Of the variables."""
+        coordinates = x.reshape(len(self._unit), -1) * self._unit[:, None]
+        return Motion(*(basis @ coordinates.T for basis in self.basis))
+
+
 class Evaluation:
     """Objective, constraints and their derivatives at a vector of variables; remembers the last one.
 
-    Variables are, joint by joint, the start and the coordinates, in units of ``unit``. Not to be shared by threads.
+    Variables are, joint by joint, the start and the coordinates, in units of half the joint's range. Not to be shared
+    by threads.
 
     Attributes:
-        series: The basis.
-        samples: Instants of the grid in a period.
-        unit: Of each joint's variables, shape (n,), [rad, m].
-        information: How to see it.
-        known: Information from before, shape (r, r).
-        weight: How many measured samples each instant of the grid stands for.
-        floor: Added to the diagonal of the information, so that it can be inverted.
-        criterion: To be minimised.
-        blocks: To be kept.
+        problem: What is designed.
+        blocks: The constraints that are looked at.
         counts: How often each of objective, gradient, constraints and Jacobian was evaluated.
     """
 
-    series: FourierSeries
-    samples: int
-    unit: Array
-    information: Information
-    known: Array
-    weight: float
-    floor: float
-    criterion: Criterion
-    blocks: Sequence[Block]
-    counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(("objective", "gradient", "constraints", "jacobian"), 0))
-
-    def __post_init__(self) -> None:
-        time = self.series.grid(self.samples)
-        ones = np.ones((self.samples, 1))
-        self._basis = [np.hstack([ones * (order == 0), self.series.basis(time, order)]) for order in range(ORDERS)]
-        self._last: tuple[Array, Motion] | None = None
-        self._known: dict[str, Any] = {}
+    def __init__(
+        self, problem: ExcitationProblem, blocks: Sequence[Block], stride: int = 1, extra: Array | None = None
+    ) -> None:
+        """Constraints at every so many instants of the design grid, dense ones at twice all of them, and at extra ones."""
+        self.problem, self.blocks = problem, tuple(blocks)
+        self.counts = dict.fromkeys(("objective", "gradient", "constraints", "jacobian"), 0)
+        series, unit, more = problem.series, problem.limits.half_range, np.empty(0) if extra is None else extra
+        time = series.grid(problem.samples)
+        self._grid = Grid(series, time, unit)
+        sparse = Grid(series, np.append(time[::stride], more), unit)
+        dense = Grid(series, np.append(series.grid(2 * problem.samples), more), unit)
+        self._grids = [dense if block.dense else sparse for block in self.blocks]
+        self._last, self._known = np.empty(0), dict[Any, Any]()
 
     @property
     def variables(self) -> int:
         """Their number."""
-        return len(self.unit) * (1 + self.series.size)
-
-    def motion(self, x: Array) -> Motion:
-        """On the grid."""
-        if self._last is None or not np.array_equal(self._last[0], x):
-            coordinates = x.reshape(len(self.unit), -1) * self.unit[:, None]
-            self._last = x.copy(), Motion(*(basis @ coordinates.T for basis in self._basis))
-            self._known = {}
-        return self._last[1]
+        return len(self.problem.limits.lower) * (1 + self.problem.series.size)
 
     def objective(self, x: Array) -> float:
         """The criterion."""
@@ -77,66 +76,77 @@ class Evaluation:
         """Of the criterion, shape (variables,)."""
         self.counts["gradient"] += 1
         _, slope, rows = self._criterion(x)
-        motion = self.motion(x)
-        parts = self.information.pull_back(motion, rows, self.weight * slope)
-        total = sum(part.T @ basis for part, basis in zip(parts, self._basis, strict=False))
-        return np.asarray(self.unit[:, None] * total).ravel()
-
-    def total(self, information: Array) -> Array:
-        """All information, from that of the grid."""
-        return np.asarray(self.known + self.weight * information + self.floor * np.eye(len(self.known)))
-
-    def _criterion(self, x: Array) -> tuple[float, Array, list[Array]]:
-        motion = self.motion(x)
-        if "criterion" not in self._known:
-            information, rows = self.information.sampled(motion)
-            self._known["criterion"] = *self.criterion.evaluate(self.total(information)), rows
-        answer: tuple[float, Array, list[Array]] = self._known["criterion"]
-        return answer
+        problem = self.problem
+        weight = problem.measured / problem.samples
+        parts = problem.information.pull_back(self._motion(self._grid, x), rows, weight * slope)
+        total = sum(part.T @ basis for part, basis in zip(parts, self._grid.basis, strict=False))
+        return np.asarray(problem.limits.half_range[:, None] * total).ravel()
 
     def constraints(self, x: Array) -> Array:
         """Instant by instant within each block."""
         self.counts["constraints"] += 1
-        motion = self.motion(x)
-        return np.concatenate([block.constrain(motion).ravel() for block in self.blocks] or [np.empty(0)])
+        parts = [
+            block.constrain(self._motion(grid, x)).ravel() for block, grid in zip(self.blocks, self._grids, strict=True)
+        ]
+        return np.concatenate(parts or [np.empty(0)])
 
     def bounds(self, tightening: float) -> tuple[Array, Array]:
         """Of the constraints, moved inwards."""
-        sides = [[np.tile(side, self.samples) for side in block.bounds] for block in self.blocks]
+        sides = [
+            [np.tile(side, grid.size) for side in block.bounds]
+            for block, grid in zip(self.blocks, self._grids, strict=True)
+        ]
         if not sides:
             return np.empty(0), np.empty(0)
         lower, upper = (np.concatenate(parts) for parts in zip(*sides, strict=True))
         return lower + tightening, upper - tightening
 
     def jacobian(self, x: Array) -> Array:
-        """Nonzeros in the order of :attr:`pattern`, before its permutation."""
+        """Nonzeros of the constraints' Jacobian, at the places of :attr:`pattern`."""
         self.counts["jacobian"] += 1
-        motion = self.motion(x)
-        parts = [self._chain(block, motion) for block in self.blocks]
+        parts = [self._chain(block, grid, x) for block, grid in zip(self.blocks, self._grids, strict=True)]
         return np.concatenate(parts or [np.empty(0)])
-
-    def _chain(self, block: Block, motion: Motion) -> Array:
-        rows, joints = np.nonzero(block.depends)
-        total = 0.0
-        for order, slope in block.slopes(motion).items():
-            total = total + slope[:, rows, joints][:, :, None] * self._basis[order][:, None, :]
-        return np.asarray(total * self.unit[joints][None, :, None]).ravel()
 
     @property
     def pattern(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
         """Row and column of each nonzero of :meth:`jacobian`."""
-        width, first = 1 + self.series.size, 0
+        width, first = 1 + self.problem.series.size, 0
         rows, columns = [np.empty(0, np.intp)], [np.empty(0, np.intp)]
-        for block in self.blocks:
+        for block, grid in zip(self.blocks, self._grids, strict=True):
             i, j = np.nonzero(block.depends)
             m = len(block.depends)
-            row = first + np.arange(self.samples)[:, None, None] * m + i[None, :, None]
+            row = first + np.arange(grid.size)[:, None, None] * m + i[None, :, None]
             column = j[None, :, None] * width + np.arange(width)[None, None, :]
-            shape = (self.samples, len(i), width)
+            shape = (grid.size, len(i), width)
             rows.append(np.broadcast_to(row, shape).ravel())
             columns.append(np.broadcast_to(column, shape).ravel())
-            first += self.samples * m
+            first += grid.size * m
         return np.concatenate(rows), np.concatenate(columns)
+
+    def _chain(self, block: Block, grid: Grid, x: Array) -> Array:
+        rows, joints = np.nonzero(block.depends)
+        total = np.zeros((grid.size, len(rows), 1 + self.problem.series.size))
+        for order, slope in block.slopes(self._motion(grid, x)).items():
+            total += slope[:, rows, joints][:, :, None] * grid.basis[order][:, None, :]
+        return np.asarray(total * self.problem.limits.half_range[joints][None, :, None]).ravel()
+
+    def _criterion(self, x: Array) -> tuple[float, Array, list[Array]]:
+        motion, problem = self._motion(self._grid, x), self.problem
+        if "criterion" not in self._known:
+            information, rows = problem.information.sampled(motion)
+            total = problem.known + information * (problem.measured / problem.samples)
+            total[np.diag_indices_from(total)] += FLOOR * problem.measured
+            self._known["criterion"] = *problem.criterion.evaluate(total), rows
+        answer: tuple[float, Array, list[Array]] = self._known["criterion"]
+        return answer
+
+    def _motion(self, grid: Grid, x: Array) -> Motion:
+        if not np.array_equal(self._last, x):
+            self._last, self._known = x.copy(), {}
+        if grid not in self._known:
+            self._known[grid] = grid.motion(x)
+        motion: Motion = self._known[grid]
+        return motion
 
 
 class _Call(ca.Callback):
