@@ -36,6 +36,7 @@ class NlpSettings:
 
     Attributes:
         tolerance: On the optimality conditions.
+        constraint_tolerance: Largest violation of a constraint.
         acceptable_tolerance: Good enough when fifteen iterations in a row bring no more; ``tolerance`` turns this off.
         max_iterations: Largest number of iterations.
         max_seconds: Largest wall time.
@@ -46,6 +47,7 @@ class NlpSettings:
     """
 
     tolerance: float = 1e-8
+    constraint_tolerance: float = 1e-4
     acceptable_tolerance: float = 1e-6
     max_iterations: int = 1000
     max_seconds: float = math.inf
@@ -55,7 +57,7 @@ class NlpSettings:
     linear_solver: str = "mumps"
 
     def __post_init__(self) -> None:
-        for name in ("tolerance", "acceptable_tolerance", "max_iterations", "max_seconds"):
+        for name in ("tolerance", "constraint_tolerance", "acceptable_tolerance", "max_iterations", "max_seconds"):
             if not getattr(self, name) > 0:
                 raise ParameterError(f"NLP settings: {name} must be positive; got {getattr(self, name)}")
 
@@ -67,6 +69,7 @@ class NlpSettings:
             "ipopt.print_level": 0,
             "ipopt.sb": "yes",
             "ipopt.tol": self.tolerance,
+            "ipopt.constr_viol_tol": self.constraint_tolerance,
             "ipopt.acceptable_tol": max(self.acceptable_tolerance, self.tolerance),
             "ipopt.max_iter": self.max_iterations,
             "ipopt.max_wall_time": min(self.max_seconds, 1e20),

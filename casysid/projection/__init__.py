@@ -1,7 +1,7 @@
 """The physically consistent parameters nearest to an estimate, as the data measure distance (paper, §III-B).
 
-IPOPT minimises over virtual parameters, in which every real vector is consistent. The same problem over the cone of consistent
-parameters is convex: Clarabel finds its global optimum, which certifies IPOPT's answer or takes its place.
+IPOPT minimises over virtual parameters, in which every real vector is consistent. The same problem over the cone of
+consistent parameters is convex: Clarabel finds its global optimum, which certifies IPOPT's answer or takes its place.
 """
 
 from casysid.projection.api import constrained_least_squares, project
@@ -15,10 +15,12 @@ from casysid.projection.knowledge import (
     total_mass,
 )
 from casysid.projection.layout import ParameterLike
-from casysid.projection.problem import ProjectionProblem, build_projection
+from casysid.projection.problem import FLOOR, PRIOR_BUDGET, ProjectionProblem, build_projection
 from casysid.projection.results import ProjectionResult, ProjectionStatus, Solver
 
 __all__ = [
+    "FLOOR",
+    "PRIOR_BUDGET",
     "KeptLink",
     "Knowledge",
     "LinearKnowledge",

@@ -8,12 +8,12 @@ import numpy.typing as npt
 from casysid.errors import ParameterError
 from casysid.moments import NormalEquations
 from casysid.nlp import Progress
-from casysid.projection.certificate import task_of
 from casysid.projection.layout import as_vector
 from casysid.projection.misfit import misfit_of_equations, misfit_of_estimate
 from casysid.projection.problem import ProjectionProblem
 from casysid.projection.results import ProjectionResult
 from casysid.projection.solving import solve_task
+from casysid.projection.task import task_of
 
 
 def project(
@@ -27,15 +27,15 @@ def project(
 ) -> ProjectionResult:
     """The physically consistent parameters nearest to an estimate, as the data measure distance.
 
-    Minimises ``(θ - θ_est)ᵀ G (θ - θ_est)``; directions in the null space of ``G`` are decided by staying close to the prior.
+    Minimises ``(θ - θ_est)ᵀ G (θ - θ_est)``; what is in the null space of ``G`` stays close to the prior.
 
     Args:
         problem: From :func:`build_projection`.
         estimate: ``θ_est``, shape (p,).
         metric: ``G``, shape (p, p): the data's metric, such as the estimator's weighted ``S_xx``.
         prior: The model file's parameters, shape (p,); zeros when None.
-        residual_energy: ``Σ w (y - xᵀθ_est)²`` in the units of ``G``, the measure of what is a small misfit; None takes a fit
-            to 3 % of the torque.
+        residual_energy: ``Σ w (y - xᵀθ_est)²`` in the units of ``G``, the measure of what is a small misfit; None takes
+            a fit to 3 % of the torque.
         progress: Called at every iteration of IPOPT; an answer that is true ends it, and the convex answer is taken.
 
     Raises:
@@ -61,10 +61,10 @@ def constrained_least_squares(
 ) -> ProjectionResult:
     """The physically consistent parameters of least residual energy, in one step from the moments.
 
-    The same as projecting the least-squares estimate in the metric ``S_xx``; arguments and errors as in :func:`project`.
+    The same as projecting the least-squares estimate in the metric ``S_xx``; arguments and errors as :func:`project`.
     """
     if equations.xx.shape[0] != len(problem.layout):
         raise ParameterError(
-            f"projection: the moments have {equations.xx.shape[0]} columns, the problem {len(problem.layout)} parameters"
+            f"projection: the moments have {equations.xx.shape[0]} columns, the problem {len(problem.layout)}"
         )
     return solve_task(task_of(problem, misfit_of_equations(equations), prior), progress)

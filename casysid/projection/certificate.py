@@ -5,60 +5,21 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
 from casysid.arrays import Array, frozen
-from casysid.projection.convex import Cone, cone_of, solve_convex
-from casysid.projection.frame import UNIT_BODY, Frame, clipped, feasible, frame_of
-from casysid.projection.layout import as_vector
-from casysid.projection.misfit import DataMisfit
+from casysid.projection.convex import solve_convex
 from casysid.projection.objective import Objective, objective_of
-from casysid.projection.problem import ProjectionProblem
+from casysid.projection.task import Task
 
-PRIOR_WEIGHTS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
-"""Weights of the distance to the prior that are tried, heaviest first; the last is taken whatever it costs."""
+PRIOR_WEIGHTS = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e0, 1e1)
+"""Weights of the distance to the prior that are tried."""
 USUAL_WEIGHT = 1e-5
 """Where the data see everything, or the convex solver cannot say what a weight costs."""
 FAINTEST = 1e-9
 """At this weight the prior costs the data nothing: what the cost is measured from."""
-START_WEIGHT = 1e-4
-"""Draws the start to the prior in all directions, so that weakly seen ones do not begin far out."""
+LARGEST_TERM = 0.05
+"""And a share of no more than this fraction of the residual energy."""
 UNSOUND = 1e-4
-"""A convex answer is dropped when making it feasible to the last digit costs more than this fraction of the objective."""
-
-
-@dataclass(frozen=True, eq=False)
-class Task:
-    """One projection with its data and prior, ready for both solvers."""
-
-    problem: ProjectionProblem
-    misfit: DataMisfit
-    frame: Frame
-    cone: Cone
-
-    def data_misfit(self, scaled: Array) -> float:
-        """What ``φ`` costs the data."""
-        return self.misfit(self.frame.transform @ scaled)
-
-    def polished(self, scaled: Array) -> Array:
-        """``φ`` that is feasible up to a solver's rounding, made consistent to the last digit."""
-        problem = self.problem
-        inside = feasible(problem.layout, scaled, problem.consistency, problem.floor)
-        return np.where(problem.constraints.kept, self.frame.scaled_prior, inside)
-
-    def start(self, objective: Objective, lift: float) -> Array:
-        """The estimate drawn a little to the prior, clipped, and lifted off the boundary."""
-        problem = self.problem
-        inside = clipped(problem.layout, objective.minimum(self.frame, START_WEIGHT), problem.floor)
-        return self.lifted(inside, lift)
-
-    def lifted(self, scaled: Array, lift: float) -> Array:
-        """``φ`` moved into the cone by a share of unit bodies and units."""
-        result, layout = scaled.copy(), self.problem.layout
-        result[: layout.inertial].reshape(-1, 10)[:] += lift * UNIT_BODY
-        result[list(layout.non_negative)] += lift
-        return result
+"""A convex answer is dropped when to make it feasible to the last digit costs more than this fraction of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,18 +44,9 @@ class Certificate:
         object.__setattr__(self, "scaled", frozen(self.scaled))
 
     def within(self, share: float) -> float:
-        """Objectives up to this are as good: the share is of the prior's term, which is the smaller one as a rule."""
-        prior = max(self.value - self.misfit, self.objective.prior_weight)
-        return self.value + share * max(prior, 1e-3 * self.value)
-
-
-def task_of(problem: ProjectionProblem, misfit: DataMisfit, prior: npt.ArrayLike | None) -> Task:
-    """Scale a projection by its data and its prior, zeros when None."""
-    size = len(problem.layout)
-    start = np.zeros(size) if prior is None else as_vector("the prior", prior, size)
-    frame = frame_of(problem.layout, problem.constraints, misfit, start, problem.consistency, problem.floor)
-    cone = cone_of(problem.layout, problem.constraints, frame, problem.consistency, problem.floor)
-    return Task(problem, misfit, frame, cone)
+        """Objectives up to this are as good: above the optimum by a share of its smaller term, the prior's."""
+        prior = max(self.value - self.misfit, self.objective.prior_weight, 1e-3 * self.value)
+        return self.value + share * min(prior, LARGEST_TERM * (1.0 + self.misfit))
 
 
 def certify(task: Task, weight: float) -> Certificate | None:
@@ -111,16 +63,22 @@ def certify(task: Task, weight: float) -> Certificate | None:
 
 
 def weigh_prior(task: Task) -> Certificate | None:
-    """The convex optimum at the heaviest weight of the prior that the data can afford; None without any."""
+    """The convex optimum at the heaviest weight of the prior that the data can afford; None without any.
+
+    The cost grows with the weight, so a few bisections of the table find it; if none is affordable it is the faintest.
+    """
     if task.misfit.unseen.shape[1] == 0:
         return certify(task, USUAL_WEIGHT)
-    free, best = certify(task, FAINTEST), None
+    free = certify(task, FAINTEST)
     if free is None:
         return certify(task, USUAL_WEIGHT)
-    for weight in PRIOR_WEIGHTS:
-        certificate = certify(task, weight)
-        if certificate is not None:
-            best = dataclasses.replace(certificate, prior_cost=certificate.misfit - free.misfit)
-            if best.prior_cost <= task.problem.prior_budget * (1.0 + free.misfit):
-                break
-    return best
+    budget = task.problem.prior_budget * (1.0 + free.misfit)
+    best, affordable, dear = free, -1, len(PRIOR_WEIGHTS)
+    while dear - affordable > 1:
+        middle = (affordable + dear) // 2
+        tried = certify(task, PRIOR_WEIGHTS[middle])
+        if tried is not None and tried.misfit - free.misfit <= budget:
+            best, affordable = tried, middle
+        else:
+            dear = middle
+    return dataclasses.replace(best, prior_cost=best.misfit - free.misfit)

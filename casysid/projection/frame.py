@@ -121,7 +121,7 @@ def _nearest_consistent(layout: Layout, constraints: Constraints, prior: Array, 
             f"projection: the prior is not physically consistent at {', '.join(names)}; the nearest consistent values "
             f"take its place{', but links to be kept stay as they are' if kept.any() else ''}",
             CasysidWarning,
-            stacklevel=4,
+            stacklevel=5,
         )
     scale = np.array([_congruence(_ball(body, *size)) for body, *size in zip(bodies, *_sizes(bodies), strict=True)])
     unit = np.linalg.solve(scale, bodies[..., None])[..., 0] if len(bodies) else bodies

@@ -27,11 +27,13 @@ class LinearKnowledge:
         coefficients: By parameter name, such as ``{"link_1.m": 1.0, "link_2.m": 1.0}``.
         lower: May be -inf.
         upper: May be inf.
+        name: By which the result speaks of it; the parameters' names when empty.
     """
 
     coefficients: Mapping[str, float]
     lower: float = -math.inf
     upper: float = math.inf
+    name: str = ""
 
     def __post_init__(self) -> None:
         if not self.lower <= self.upper:
@@ -61,13 +63,18 @@ def link_mass(link: str, lower: float, upper: float | None = None) -> LinearKnow
 def total_mass(links: Iterable[str], lower: float, upper: float | None = None) -> LinearKnowledge:
     """The mass of several links together [kg], or the range it lies in."""
     masses = {f"{link}.m": 1.0 for link in links}
-    return LinearKnowledge(coefficients=masses, lower=lower, upper=lower if upper is None else upper)
+    highest = lower if upper is None else upper
+    return LinearKnowledge(coefficients=masses, lower=lower, upper=highest, name="total mass")
 
 
 def center_of_mass_within(link: str, lower: Sequence[float], upper: Sequence[float]) -> tuple[LinearKnowledge, ...]:
     """The centre of mass inside a box of the link's joint frame [m]: ``lower m ≤ m c ≤ upper m``, which is linear."""
     return tuple(
-        LinearKnowledge(coefficients={f"{link}.mc{axis}": sign, f"{link}.m": -sign * bound}, lower=0.0)
+        LinearKnowledge(
+            coefficients={f"{link}.mc{axis}": sign, f"{link}.m": -sign * bound},
+            lower=0.0,
+            name=f"{link} centre of mass {axis}",
+        )
         for axis, low, high in zip("xyz", lower, upper, strict=True)
         for sign, bound in ((1.0, low), (-1.0, high))
     )
@@ -126,6 +133,6 @@ def constraints_of(layout: Layout, knowledge: Sequence[Knowledge]) -> Constraint
         matrix=frozen(matrix),
         lower=lower,
         upper=upper,
-        names=tuple(" + ".join(item.coefficients) for item in rows),
+        names=tuple(item.name or " + ".join(item.coefficients) for item in rows),
         kept=kept,
     )

@@ -53,8 +53,8 @@ def build_projection(
         consistency: Full, or only positive mass and inertia as in the paper.
         knowledge: What is known beside the data.
         floor: Fraction of its reference that every link keeps in every direction, so that its inertia can be inverted.
-        prior_budget: What staying close to the prior, where the data do not see, may cost the data through the laws that
-            bind both, as a fraction of the residual energy.
+        prior_budget: What staying close to the prior, where the data do not see, may cost the data through the laws
+            that bind both, as a fraction of the residual energy.
 
     Raises:
         ParameterError: The columns are in another order, knowledge is about something else, a number is out of range.

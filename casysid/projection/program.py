@@ -1,8 +1,8 @@
 """The projection as a nonlinear program over virtual parameters, for IPOPT, with structured exact derivatives.
 
 ``f(u) = ‖C φ(u) - d‖²`` with ``φ(u) = floor + virtual-parameter map``: every ``u`` is consistent. The gradient is
-``2 Jᵀ Cᵀ (C φ - d)`` and the Hessian ``2 Jᵀ H J``, ``H = Cᵀ C``, plus the map's own curvature, ten by ten a link: far cheaper
-than to differentiate ``f`` blindly.
+``2 Jᵀ Cᵀ (C φ - d)`` and the Hessian ``2 Jᵀ H J``, ``H = Cᵀ C``, plus the map's own curvature, ten by ten a link: far
+cheaper than to differentiate ``f`` blindly.
 """
 
 from __future__ import annotations
@@ -27,15 +27,17 @@ from casysid.projection.knowledge import Constraints
 from casysid.projection.layout import Layout
 from casysid.projection.objective import SCALE, Objective
 
-SETTINGS = NlpSettings(tolerance=1e-5, acceptable_tolerance=1e-5, max_iterations=600, scaling=False)
+SETTINGS = NlpSettings(
+    tolerance=1e-5, constraint_tolerance=1e-9, acceptable_tolerance=1e-5, max_iterations=600, scaling=False
+)
 
 
 @dataclass(frozen=True, eq=False)
 class ProjectionProgram:
     """IPOPT's program, and what its variables mean.
 
-    The variables are ten virtual parameters for each link that is not kept, then the joints' numbers, as square roots where
-    they cannot be negative.
+    The variables are ten virtual parameters for each link that is not kept, then the joints' numbers, as square roots
+    where they cannot be negative.
 
     Attributes:
         nlp: What :func:`casysid.nlp.solve_nlp` takes.
@@ -83,16 +85,18 @@ def build_program(
     """Build the program once; parameters of the objective come with each solve."""
     p, c = len(layout), len(constraints.matrix)
     free = np.flatnonzero(~constraints.kept[: layout.inertial : 10])
-    C, H, d = ca.SX.sym("C", ca.Sparsity.upper(p)), ca.SX.sym("H", ca.Sparsity.upper(p)), ca.SX.sym("d", p)
+    upper = ca.Sparsity.upper(p)
+    c_entries, h_entries, d = ca.SX.sym("C", upper.nnz()), ca.SX.sym("H", upper.nnz()), ca.SX.sym("d", p)
+    C, H = ca.SX(upper, c_entries), ca.triu2symm(ca.SX(upper, h_entries))
     kept, A = ca.SX.sym("kept", p), ca.SX.sym("A", c, p)
-    given = ca.vertcat(ca.vertcat(*C.nonzeros()), ca.vertcat(*H.nonzeros()), d, kept, ca.vec(A))
+    given = ca.vertcat(c_entries, h_entries, d, kept, ca.vec(A))
     u, phi = _scaled_parameters(layout, free, kept, consistency, floor)
     J, residual = ca.jacobian(phi, u), C @ phi - d
     objective, constraint, slope = SCALE * ca.sumsqr(residual), A @ phi, 2.0 * SCALE * (C.T @ residual)
     lam_f, lam_g, pull = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", c), ca.SX.sym("pull", p)
     curvature = ca.jacobian(ca.jacobian(ca.dot(pull, phi), u), u)  # of the map alone, (10, 10) blocks
     curvature = ca.substitute(curvature, pull, lam_f * slope + A.T @ lam_g)
-    hessian = ca.triu(2.0 * SCALE * lam_f * (J.T @ (ca.triu2symm(H) @ J)) + curvature)
+    hessian = ca.triu(2.0 * SCALE * lam_f * (J.T @ (H @ J)) + curvature)
     derivatives = {
         "grad_f": ca.Function("grad_f", [u, given], [objective, J.T @ slope], ["x", "p"], ["f", "grad_f_x"]),
         "hess_lag": ca.Function(

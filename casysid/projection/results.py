@@ -33,7 +33,7 @@ class ProjectionResult:
         parameters: ``θ``, shape (p,).
         status: How far they can be trusted.
         solver: Whose answer they are.
-        misfit: Energy of the residuals above the unconstrained fit's, as a fraction of the latter: the price of physics.
+        misfit: Energy of the residuals above the unconstrained fit's, as a fraction of that: the price of physics.
         gap: By how much IPOPT's misfit exceeds that of the convex optimum, in the same unit; nan without one of them.
         prior_weight: Weight of the distance to the prior in the directions that the data do not see, in the same unit;
             nan where none was needed.

@@ -12,10 +12,11 @@ from casysid.arrays import Array
 from casysid.errors import CasysidWarning, SolverError
 from casysid.inertia import smallest_eigenvalue
 from casysid.nlp import NlpIteration, NlpSolution, NlpStatus, Progress, solve_nlp
-from casysid.projection.certificate import USUAL_WEIGHT, Certificate, Task, weigh_prior
+from casysid.projection.certificate import USUAL_WEIGHT, Certificate, weigh_prior
 from casysid.projection.frame import UNIT_BODY
 from casysid.projection.objective import SCALE, Objective, objective_of
 from casysid.projection.results import ProjectionResult, ProjectionStatus, Solver
+from casysid.projection.task import Task
 
 CLOSE = 1e-3
 """IPOPT is stopped when it exceeds the convex optimum by this fraction of the prior's term."""
@@ -23,7 +24,7 @@ SHORT = 1e-2
 """And its answer is not taken when it exceeds it by more than this fraction."""
 LIFT = 1e-2
 """Starts lie this far inside: on the boundary the virtual parameters have stationary points that are no optimum."""
-ROUNDING = 1e-8
+ROUNDING = 1e-7
 """Violations of constraints below this are rounding."""
 AT_BOUND = 2e-3
 """What lies closer to its bound than this, in the frame's units, is on it."""
@@ -39,7 +40,7 @@ def solve_task(task: Task, progress: Progress | None) -> ProjectionResult:
     local, iterations = _solve_locally(task, certificate, progress)
     scaled, status, solver = _choose(local, certificate)
     if status is not ProjectionStatus.CERTIFIED:
-        warnings.warn(f"projection: {status.value}", CasysidWarning, stacklevel=4)
+        warnings.warn(f"projection: {status.value}", CasysidWarning, stacklevel=3)
     gap = math.nan if local is None or certificate is None else task.data_misfit(local) - certificate.misfit
     return _result(task, scaled, status, solver, certificate, gap, iterations, began)
 
@@ -49,7 +50,7 @@ def _choose(local: Array | None, certificate: Certificate | None) -> tuple[Array
         return certificate.scaled, ProjectionStatus.CONVEX, Solver.CLARABEL
     if local is None:
         raise SolverError(
-            "projection: neither IPOPT nor the convex solver found consistent parameters; look at the estimate and its metric"
+            "projection: neither IPOPT nor the convex solver found consistent parameters; look at the estimate's metric"
         )
     status = ProjectionStatus.UNCERTIFIED if certificate is None else ProjectionStatus.CERTIFIED
     return local, status, Solver.IPOPT
@@ -60,7 +61,7 @@ def _is_good(local: Array | None, certificate: Certificate) -> bool:
 
 
 def _solve_locally(task: Task, certificate: Certificate | None, progress: Progress | None) -> tuple[Array | None, int]:
-    """IPOPT's best answer, None if it has none, and its iterations; from the prior only if the estimate's start fails."""
+    """IPOPT's best answer, None if it has none, and its iterations; the prior is the second start."""
     objective = objective_of(task.misfit, task.frame, USUAL_WEIGHT) if certificate is None else certificate.objective
     goal = -math.inf if certificate is None else certificate.within(CLOSE)
     best: Array | None = None
