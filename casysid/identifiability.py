@@ -93,7 +93,7 @@ def base_parameters_of_gram(gram: Array, names: tuple[str, ...], tolerance: floa
     root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T  # rows whose Gram is the standardised one
     independent = _independent_columns(root, live, tolerance)
     weights = np.linalg.lstsq(root[:, independent], root, rcond=None)[0]
-    transform = weights / np.where(live, scale, 1.0)[independent][:, None] * scale
+    transform = weights * scale[independent][:, None] / np.where(live, scale, 1.0)
     transform[:, independent] = np.eye(len(independent))
     singular = np.linalg.svd(root[:, independent], compute_uv=False) if len(independent) else np.ones(1)
     return BaseParameters(names, independent, frozen(transform), float(singular[0] / singular[-1]))
