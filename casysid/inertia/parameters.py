@@ -21,6 +21,8 @@ from casysid.errors import ParameterError
 KINDS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 _ROW, _COLUMN = np.array([0, 0, 1, 0, 1, 2]), np.array([0, 1, 1, 2, 2, 2])  # where the six entries of I stand
 _AXES = np.arange(3)
+MASSLESS = 1e-100
+"""Masses [kg] below this are zero: one cannot divide by them."""
 
 
 class Consistency(enum.Enum):
@@ -134,7 +136,8 @@ def mass_properties(parameters: npt.ArrayLike) -> MassProperties:
     """Mass, centre of mass and inertia about it, of parameters (..., 10), consistent or not (parallel-axis theorem)."""
     theta = as_bodies(parameters)
     mass, first = theta[..., 0], theta[..., 1:4]
-    center = np.divide(first, mass[..., None], out=np.zeros_like(first), where=mass[..., None] != 0.0)
+    heavy = np.abs(mass[..., None]) > MASSLESS
+    center = np.divide(first, mass[..., None], out=np.zeros_like(first), where=heavy)
     inertia = np.tensordot(theta, _inertia_basis(), axes=1)
     return MassProperties(mass, center, inertia - _parallel_axis(mass, center))
 

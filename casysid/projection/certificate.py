@@ -18,8 +18,9 @@ FAINTEST = 1e-9
 """At this weight the prior costs the data nothing: what the cost is measured from."""
 LARGEST_TERM = 0.05
 """And a share of no more than this fraction of the residual energy."""
-UNSOUND = 1e-4
-"""A convex answer is dropped when to make it feasible to the last digit costs more than this fraction of it."""
+UNSOUND = 1e-4, 1e-7
+"""A convex answer is dropped when, feasible to the last digit, it exceeds the dual bound by more than this fraction of
+the objective and this fraction of the residual energy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,7 @@ def certify(task: Task, weight: float) -> Certificate | None:
         return None
     scaled = task.polished(optimum.scaled)
     value = objective(scaled)
-    if value - optimum.bound > UNSOUND * (value + weight):
+    if not value - optimum.bound <= UNSOUND[0] * value + UNSOUND[1]:
         return None
     return Certificate(objective, scaled, value, task.data_misfit(scaled))
 

@@ -39,6 +39,8 @@ SMALLEST = 0.1
 """A link's reference radius of gyration is at least this fraction of the robot's median."""
 LOUDEST = 100.0
 """Effects of a single parameter are not believed to exceed the residuals by more than this factor."""
+NEGLIGIBLE = 1e-12, 1e-6
+"""Masses [kg] and radii of gyration [m] below these are rounding and say nothing."""
 NOTHING_KNOWN = (1.0, 0.1)
 """Reference mass [kg] and radius of gyration [m] where the prior is empty."""
 ROUNDED = 1e-6
@@ -131,19 +133,19 @@ def _nearest_consistent(layout: Layout, constraints: Constraints, prior: Array, 
 
 def _sizes(bodies: Array) -> tuple[Array, Array]:
     """Reference mass and radius of gyration of each link, (n,) and (n,), none of them zero."""
-    mass = np.maximum(bodies[:, 0], 0.0)
+    mass = np.where(bodies[:, 0] > NEGLIGIBLE[0], bodies[:, 0], 0.0)
     spread = np.trace(mass_properties(bodies).inertia, axis1=1, axis2=2) / 6.0  # tr Σ / 3 about the centre of mass
     square = np.divide(spread, mass, out=np.zeros_like(mass), where=(mass > 0.0) & (spread > 0.0))
     mean_mass = np.mean(mass) if mass.any() else NOTHING_KNOWN[0]
-    radius = np.sqrt(square)
+    radius = np.where(square > NEGLIGIBLE[1] ** 2, np.sqrt(square), 0.0)
     median_radius = np.median(radius[radius > 0.0]) if radius.any() else NOTHING_KNOWN[1]
     return np.maximum(mass, LIGHTEST * mean_mass), np.maximum(radius, SMALLEST * median_radius)
 
 
 def _ball(body: Array, mass: float, radius: float) -> Array:
-    """``A`` of a ball of the given mass and radius of gyration at the body's centre of mass."""
+    """``A`` of a ball of the given mass and radius of gyration at the body's centre of mass, if that means anything."""
     A = np.diag([radius, radius, radius, 1.0])
-    if is_consistent(body, Consistency.INERTIA, tolerance=ROUNDED):
+    if body[0] > LIGHTEST * mass and is_consistent(body, Consistency.INERTIA, tolerance=ROUNDED):
         A[:3, 3] = mass_properties(body).center_of_mass
     return np.asarray(np.sqrt(mass) * A)
 
