@@ -113,7 +113,7 @@ class JointBlock(Block):
         return {self.order: np.broadcast_to(rows, (len(motion.position), *rows.shape))}
 
     @cached_property
-    def depends(self) -> npt.NDArray[np.bool_]:  # type: ignore[override]
+    def depends(self) -> npt.NDArray[np.bool_]:
         """Each on its own joint."""
         return np.asarray(np.eye(self.n, dtype=np.bool_)[self.joints])
 
@@ -135,7 +135,10 @@ class TorqueBlock(Block):
     limit: Array
     _mapped: dict[tuple[str, int], Mapped] = field(default_factory=dict, repr=False)
 
-    kind: ClassVar[str] = "torque"
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """Of quantity."""
+        return "torque"
 
     @property
     def labels(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -181,7 +184,7 @@ class TorqueBlock(Block):
         return {order: full[:, :, order * n : (order + 1) * n] for order in range(3)}
 
     @cached_property
-    def depends(self) -> npt.NDArray[np.bool_]:  # type: ignore[override]
+    def depends(self) -> npt.NDArray[np.bool_]:
         """Joints of the same branch."""
         n = len(self.regressor.robot.dofs)
         table = np.zeros((len(self.joints), n), dtype=np.bool_)
@@ -193,7 +196,11 @@ class TorqueBlock(Block):
         """The same for fewer joints, chosen by a mask (m,); None for none."""
         if wanted.all():
             return self
-        return TorqueBlock(self.regressor, self.parameters, self.joints[wanted], self.limit[wanted]) if wanted.any() else None
+        return (
+            TorqueBlock(self.regressor, self.parameters, self.joints[wanted], self.limit[wanted])
+            if wanted.any()
+            else None
+        )
 
     def _at(self, name: str, motion: Motion) -> Array:
         key = name, len(motion.position)
@@ -212,12 +219,11 @@ class TorqueBlock(Block):
         robot = self.regressor.robot
         p, v, a = (ca.SX.sym(name, robot.nv) for name in "pva")
         tau = self.regressor.torque(configuration(robot, p), v, a, ca.DM(self.parameters))
-        tau = ca.vertcat(*(tau[int(k)] for k in self.joints))
+        tau = tau[self.joints.tolist()]
         jacobian = ca.jacobian(tau, ca.vertcat(p, v, a))
-        outputs = {"torque": ca.densify(tau), "slopes": ca.vertcat(*jacobian.nonzeros())}
-        functions = {
-            name: ca.Function(name, [p, v, a], [value], {"cse": True}) for name, value in outputs.items()
-        }
+        entries: list[Any] = jacobian.nonzeros()
+        outputs = {"torque": ca.densify(tau), "slopes": ca.vertcat(*entries)}
+        functions = {name: ca.Function(name, [p, v, a], [value], {"cse": True}) for name, value in outputs.items()}
         return functions, jacobian.sparsity()
 
 

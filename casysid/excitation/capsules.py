@@ -148,7 +148,9 @@ def _mjcf_capsules(robot: Robot) -> Iterator[Capsule]:
         joint, placement = carriers.get(name, (WORLD, pin.SE3.Identity()))
         w, x, y, z = map(float, compiled.geom_quat[g])
         pose = placement * pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), compiled.geom_pos[g].copy())
-        yield from _mjcf_shape(name, joint, pose, int(compiled.geom_type[g]), compiled.geom_size[g], compiled.geom_aabb[g])
+        yield from _mjcf_shape(
+            name, joint, pose, int(compiled.geom_type[g]), compiled.geom_size[g], compiled.geom_aabb[g]
+        )
 
 
 def _mjcf_shape(link: str, joint: int, pose: Any, kind: int, size: Array, bounds: Array) -> Iterator[Capsule]:

@@ -36,7 +36,11 @@ class ClearanceBlock(Block):
     margin: float
     reach: float
 
-    kind: ClassVar[str] = "distance"
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """Of quantity."""
+        return "distance"
+
     dense: ClassVar[bool] = True
 
     @property
@@ -95,7 +99,7 @@ class ClearanceBlock(Block):
         return (np.log(total) + top) / SOFTNESS, powers / total
 
     @cached_property
-    def depends(self) -> npt.NDArray[np.bool_]:  # type: ignore[override]
+    def depends(self) -> npt.NDArray[np.bool_]:
         """All joints."""
         return np.ones((1, len(self.every.kinematics.robot.joints)), dtype=np.bool_)
 
@@ -120,14 +124,18 @@ class KeepInBlock(Block):
     lower: Array
     upper: Array
 
-    kind: ClassVar[str] = "keep-in box"
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """Of quantity."""
+        return "keep-in box"
 
     def __post_init__(self) -> None:
         for name in ("point", "lower", "upper"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        if any(getattr(self, name).shape != (3,) for name in ("point", "lower", "upper")) or not (
-            self.lower < self.upper
-        ).all():
+        if (
+            any(getattr(self, name).shape != (3,) for name in ("point", "lower", "upper"))
+            or not (self.lower < self.upper).all()
+        ):
             raise ParameterError(
                 f"keep-in box of '{self.frame}': wanted two corners of three numbers, lower before upper; "
                 f"got {self.lower} and {self.upper}"
@@ -165,6 +173,6 @@ class KeepInBlock(Block):
         return {0: rows / self.scale[:, None]}
 
     @cached_property
-    def depends(self) -> npt.NDArray[np.bool_]:  # type: ignore[override]
+    def depends(self) -> npt.NDArray[np.bool_]:
         """Joints before it."""
         return np.tile(self.kinematics.moved_by[self.joint], (3, 1))

@@ -202,11 +202,11 @@ def build_clearance(
     share = (distances[:, : len(pairs)] < margin).mean(axis=0)
     still = _spread_by_meeting(everything, np.ptp(distances, axis=0)) < _STILL
     ignored = [
-        f"{everything.labels[k]} overlap as capsules in {share[k]:.0%} of all configurations: their distance is not kept"
+        f"{everything.labels[k]} overlap as capsules in {share[k]:.0%} of all configurations, so this is not looked at"
         for k in np.flatnonzero(share > FIT_FAULT)
     ]
     ignored += [
-        f"link '{capsules[i].link}' and '{obstacles[k].name}' stay at the same distance, which is not looked at"
+        f"a part of link '{capsules[i].link}' stays where it is to '{obstacles[k].name}', which is not looked at"
         for i, k in everything.meetings[still]
     ]
     return dataclasses.replace(
@@ -229,8 +229,10 @@ def _are_neighbours(robot: Robot, one: int, other: int) -> bool:
     """Whether two links are the same, or joined by a joint, or by several joints in one place."""
     if one == other:
         return True
-    return _attached_to(robot, one) == other or _attached_to(robot, other) == one or (
-        one != WORLD and other != WORLD and _touch(robot, one, other)
+    return (
+        _attached_to(robot, one) == other
+        or _attached_to(robot, other) == one
+        or (one != WORLD and other != WORLD and _touch(robot, one, other))
     )
 
 

@@ -62,11 +62,23 @@ def to_boxes(a: Array, b: Array, lower: Array, upper: Array) -> Closest:
         _, direction = _signed_box(a + middle[..., None] * u, lower, upper)
         falling = _dot(direction, u) < 0.0
         left, right = np.where(falling, middle, left), np.where(falling, right, middle)
-    best = (left + right) / 2.0
-    best = np.where(left == 0.0, 0.0, np.where(right == 1.0, 1.0, best))
+    best = np.where(left == 0.0, 0.0, np.where(right == 1.0, 1.0, (left + right) / 2.0))
     point = a + best[..., None] * u
     distance, direction = _signed_box(point, lower, upper)
+    inner = (best > 0.0) & (best < 1.0)
+    direction = np.where(inner[..., None], _level_direction(a, u, left, right, lower, upper), direction)
     return Closest(distance, point, point - distance[..., None] * direction, direction)
+
+
+def _level_direction(a: Array, u: Array, left: Array, right: Array, lower: Array, upper: Array) -> Array:
+    """The gradient at a least value inside a segment: between those on its two sides, and across the segment.
+
+    They differ where the nearest face of a box changes just there.
+    """
+    before, after = (_signed_box(a + side[..., None] * u, lower, upper)[1] for side in (left, right))
+    fall, rise = np.minimum(_dot(before, u), 0.0), np.maximum(_dot(after, u), 0.0)
+    weight = np.where(rise - fall > _TINY, rise / np.where(rise - fall > _TINY, rise - fall, 1.0), 0.5)
+    return np.asarray(weight[..., None] * before + (1.0 - weight)[..., None] * after)
 
 
 def _signed_box(point: Array, lower: Array, upper: Array) -> tuple[Array, Array]:

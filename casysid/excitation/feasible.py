@@ -101,9 +101,9 @@ def small_start(problem: ExcitationProblem, standing: Standing, seed: int) -> Ar
 
 
 def swing(problem: ExcitationProblem, place: Array, coordinates: Array, from_there: bool) -> Array:
-    """Variables of a motion that starts at a place, or whose extremes lie about it; coordinates in units of half ranges."""
-    swing = problem.series.basis(problem.series.grid(problem.samples)) @ coordinates.T
-    shift = np.zeros(len(place)) if from_there else (swing.max(axis=0) + swing.min(axis=0)) / 2.0
+    """Variables of a motion from a place, or about it; coordinates in units of half ranges."""
+    away = problem.series.basis(problem.series.grid(problem.samples)) @ coordinates.T
+    shift = np.zeros(len(place)) if from_there else (away.max(axis=0) + away.min(axis=0)) / 2.0
     return np.column_stack([place / problem.limits.half_range - shift, coordinates]).ravel()
 
 

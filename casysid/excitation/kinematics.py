@@ -36,7 +36,7 @@ class Kinematics:
 
     @cached_property
     def moved_by(self) -> npt.NDArray[np.bool_]:
-        """Whether joint ``[i, k]``'s child frame i moves with joint k, shape (n + 1, n); the last row is the world's."""
+        """Whether child frame i moves with joint k, shape (n + 1, n); the last row is the world's."""
         n = len(self.robot.joints)
         table = np.zeros((n + 1, n), dtype=np.bool_)
         for i, joint in enumerate(self.robot.joints):
@@ -69,7 +69,7 @@ class Kinematics:
         return np.where((joint == WORLD)[:, None], local, moving)
 
     def slopes(self, frames: Frames, joint: npt.NDArray[np.intp], point: Array, direction: Array) -> Array:
-        """How fast points (N, m, 3), fixed to frames, go in given directions (N, m, 3) with each joint, shape (N, m, n)."""
+        """How fast points (N, m, 3) go in directions (N, m, 3) with each joint, shape (N, m, n)."""
         prismatic = np.array([one.kind is JointKind.PRISMATIC for one in self.robot.joints])
         along = direction @ frames.axis.transpose(0, 2, 1)  # (N, m, n)
         # d · (z × (x - o)) = z · (x × d) - d · (z × o)
@@ -83,6 +83,4 @@ def _turns(axis: Array, angle: Array) -> Array:
     """Rotations (N, 3, 3) about a unit axis (Rodrigues)."""
     x, y, z = axis
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(
-        np.eye(3) + np.sin(angle)[:, None, None] * K + (1.0 - np.cos(angle))[:, None, None] * (K @ K)
-    )
+    return np.asarray(np.eye(3) + np.sin(angle)[:, None, None] * K + (1.0 - np.cos(angle))[:, None, None] * (K @ K))

@@ -30,11 +30,11 @@ class Mapped:
         self._inputs = [np.zeros((samples, width)) for width in self.widths]
         self._output = np.zeros((samples, function.nnz_out(0)))
         for i, values in enumerate(self._inputs):
-            self._buffer.set_arg(i, memoryview(values.reshape(-1)))
-        self._buffer.set_res(0, memoryview(self._output.reshape(-1)))
+            self._buffer.set_arg(i, values.reshape(-1).data)
+        self._buffer.set_res(0, self._output.reshape(-1).data)
 
     def __call__(self, *inputs: Array) -> Array:
-        """Structural nonzeros at all samples, shape (samples, nonzeros), of inputs (samples, n); good until the next call."""
+        """Structural nonzeros at all samples, shape (samples, nonzeros), good until the next call."""
         if self._engine is not None:
             row = 0
             for values, width in zip(inputs, self.widths, strict=True):

@@ -51,7 +51,7 @@ class Evaluation:
     def __init__(
         self, problem: ExcitationProblem, blocks: Sequence[Block], stride: int = 1, extra: Array | None = None
     ) -> None:
-        """Constraints at every so many instants of the design grid, dense ones at twice all of them, and at extra ones."""
+        """Constraints every so many instants of the design grid, dense ones twice as often as it, and at extra ones."""
         self.problem, self.blocks = problem, tuple(blocks)
         self.counts = dict.fromkeys(("objective", "gradient", "constraints", "jacobian"), 0)
         series, unit, more = problem.series, problem.limits.half_range, np.empty(0) if extra is None else extra
@@ -152,7 +152,9 @@ class Evaluation:
 class _Call(ca.Callback):
     """A Python function as a CasADi function, by way of memory that both see."""
 
-    def __init__(self, name: str, function: Callable[[Array], tuple[Array, ...]], inputs: list[Any], outputs: list[Any]):
+    def __init__(
+        self, name: str, function: Callable[[Array], tuple[Array, ...]], inputs: list[Any], outputs: list[Any]
+    ):
         ca.Callback.__init__(self)
         self._function, self._in, self._out = function, inputs, outputs
         self.construct(name, {})

@@ -66,7 +66,7 @@ class FourierSeries:
 
     @cached_property
     def rest(self) -> tuple[Array, Array]:
-        """Orthonormal bases of the sine and of the cosine coefficients that start at rest, (harmonics, harmonics - 1)."""
+        """Orthonormal bases of the sines' and the cosines' coefficients at rest, each (harmonics, harmonics - 1)."""
         k = np.arange(1.0, self.harmonics + 1.0)
         return tuple(frozen(np.linalg.qr((k**power)[:, None], mode="complete")[0][:, 1:]) for power in (1, 2))  # type: ignore[return-value]
 
@@ -77,7 +77,7 @@ class FourierSeries:
         sine, cosine = w**order * np.sin(angle), w**order * np.cos(angle)
         if order == 0:
             cosine = cosine - 1.0
-        return np.hstack([sine @ self.rest[0], cosine @ self.rest[1]])
+        return np.asarray(np.hstack([sine @ self.rest[0], cosine @ self.rest[1]]))
 
     def coefficients(self, coordinates: Array) -> tuple[Array, Array]:
         """Coefficients ``a`` of the sines and ``b`` of the cosines, each (n, harmonics), of coordinates (n, size)."""
@@ -86,7 +86,7 @@ class FourierSeries:
 
     def grid(self, samples: int) -> Array:
         """So many instants of one period at equal distances, shape (samples,), [s]."""
-        return np.arange(samples) * (self.period / samples)
+        return np.asarray(np.arange(samples) * (self.period / samples), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -155,6 +155,6 @@ def check_joints(robot: Robot) -> None:
     for joint in robot.joints:
         if joint.kind not in (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC):
             raise ParameterError(
-                f"excitation: joint '{joint.name}' is {joint.kind.value}; only joints with one degree of freedom can be "
-                "moved along a Fourier series. Take a model with a fixed base and single joints"
+                f"excitation: joint '{joint.name}' is {joint.kind.value}; only joints with one degree of freedom can "
+                "be moved along a Fourier series. Take a model with a fixed base and single joints"
             )

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from casysid.arrays import Array
 from casysid.excitation.blocks import Block
 from casysid.excitation.problem import REFINEMENT, ExcitationProblem
 from casysid.excitation.series import ExcitationTrajectory, Motion
@@ -76,12 +77,12 @@ class Verification:
     def tightest(self) -> tuple[Margin, ...]:
         """The tightest quantity of each kind."""
         kinds = dict.fromkeys(one.kind for one in self.margins)
-        return tuple(min((one for one in self.margins if one.kind == kind), key=lambda one: one.share) for kind in kinds)
+        return tuple(
+            min((one for one in self.margins if one.kind == kind), key=lambda one: one.share) for kind in kinds
+        )
 
 
-def verify(
-    problem: ExcitationProblem, trajectory: ExcitationTrajectory, samples: int | None = None
-) -> Verification:
+def verify(problem: ExcitationProblem, trajectory: ExcitationTrajectory, samples: int | None = None) -> Verification:
     """The least margin of every quantity over one period, from the constraints themselves, not their smooth versions.
 
     Args:

@@ -1,0 +1,139 @@
+"""``casysid excite``: the motion to record."""
+
+from __future__ import annotations
+
+import enum
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from casysid.cli.options import GravityOption, LockOption, RobotArgument, load_robot
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from casysid.excitation import ExcitationProblem, FourierSeries, HalfSpace, JointLimits
+    from casysid.excitation.results import Progress
+    from casysid.robot import Robot
+
+
+class CriterionChoice(enum.StrEnum):
+    """Words of ``--criterion``."""
+
+    D = "d"
+    CONDITION = "condition"
+    TORQUE = "torque"
+
+
+def excite(
+    robot: RobotArgument,
+    log: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--log", metavar="LOG", help="An earlier recording: design for what it does not tell. Repeatable."
+        ),
+    ] = None,
+    period: Annotated[float | None, typer.Option(help="Of the motion [s]; default: from the limits.")] = None,
+    harmonics: Annotated[int | None, typer.Option(help="Of the base frequency; default: 5.")] = None,
+    periods: Annotated[int, typer.Option(help="How often the motion is repeated.")] = 1,
+    count: Annotated[int, typer.Option(help="So many motions that complement each other.")] = 1,
+    rate: Annotated[float, typer.Option(help="Samples per second [Hz].")] = 500.0,
+    criterion: Annotated[
+        CriterionChoice,
+        typer.Option(help="d: confidence volume; condition: condition number; torque: accuracy of predicted torque."),
+    ] = CriterionChoice.D,
+    acceleration: Annotated[float | None, typer.Option(help="Largest acceleration [rad/s², m/s²].")] = None,
+    jerk: Annotated[float | None, typer.Option(help="Largest jerk [rad/s³, m/s³].")] = None,
+    velocity_share: Annotated[float, typer.Option(help="Share of the velocity limits to use.")] = 0.9,
+    torque_share: Annotated[float, typer.Option(help="Share of the effort limits to use.")] = 0.8,
+    clearance: Annotated[float, typer.Option(help="Distance to keep between links and to the floor [m].")] = 0.01,
+    floor: Annotated[float | None, typer.Option(help="Height of a floor to stay above [m].")] = None,
+    starts: Annotated[int, typer.Option(help="Starts of the search.")] = 4,
+    seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
+    gravity: GravityOption = None,
+    lock: LockOption = None,
+    out: Annotated[
+        Path, typer.Option(help="Folder for excitation.csv, its coefficients, a ROS message, pictures.")
+    ] = Path("excitation"),
+) -> None:
+    """Design the motion of ROBOT that tells most about its parameters, within all limits."""
+    from casysid.cli.console import SOLVER_FAILED, progress_bar, speaking
+
+    with speaking() as console:
+        from casysid.excitation import DesignStatus, build_excitation, describe, design_set, limits_of, write_excitation
+        from casysid.report.excitation_pictures import write_excitation_pictures
+
+        model = load_robot(robot, gravity, lock, floating_base=False)
+        limits = limits_of(
+            model,
+            velocity_share=velocity_share,
+            torque_share=torque_share,
+            acceleration=float("inf") if acceleration is None else acceleration,
+            jerk=float("inf") if jerk is None else jerk,
+        )
+        problem = build_excitation(
+            model,
+            series=_series(limits, rate, period, harmonics),
+            periods=periods,
+            rate=rate,
+            limits=limits,
+            clearance=clearance,
+            obstacles=_floor(floor),
+        )
+        problem = _informed(model, problem, criterion, log or [])
+        with progress_bar(console) as progress:
+            designs = design_set(problem, count, starts=starts, seed=seed, progress=_watch(progress))
+            for design, folder in zip(designs, _folders(out, len(designs)), strict=True):
+                progress("write", 0.0)
+                write_excitation(design, folder)
+                write_excitation_pictures(design, folder)
+        for design, folder in zip(designs, _folders(out, len(designs)), strict=True):
+            for line in describe(design):
+                console.print(f"  · {line}", markup=False, soft_wrap=True)
+            typer.echo(str(folder / "excitation.csv"))
+    if any(design.status is not DesignStatus.CONVERGED for design in designs):
+        sys.exit(SOLVER_FAILED)
+
+
+def _series(limits: JointLimits, rate: float, period: float | None, harmonics: int | None) -> FourierSeries:
+    from casysid.excitation import FourierSeries, choose_series
+
+    usual = choose_series(limits, rate)
+    return FourierSeries(
+        usual.period if period is None else period, usual.harmonics if harmonics is None else harmonics
+    )
+
+
+def _floor(height: float | None) -> tuple[HalfSpace, ...]:
+    import numpy as np
+
+    from casysid.excitation import HalfSpace
+
+    return () if height is None else (HalfSpace("floor", np.array([0.0, 0.0, 1.0]), height),)
+
+
+def _informed(robot: Robot, problem: ExcitationProblem, choice: CriterionChoice, logs: list[Path]) -> ExcitationProblem:
+    """The problem with the criterion chosen and what the logs tell."""
+    from casysid.excitation import ConditionNumber, after_recordings, torque_accuracy
+    from casysid.recording import read_recordings
+
+    if choice is CriterionChoice.CONDITION:
+        problem = problem.judged_by(ConditionNumber())
+    elif choice is CriterionChoice.TORQUE:
+        problem = problem.judged_by(torque_accuracy(problem))
+    return after_recordings(problem, read_recordings(logs, robot)) if logs else problem
+
+
+def _watch(progress: Callable[[str, float], None]) -> Progress:
+    from casysid.excitation import DesignStep
+
+    def tell(step: DesignStep) -> None:
+        progress("design", min(1.0, (step.start - 1 + min(step.step / 100.0, 1.0)) / (step.starts + 1)))
+
+    return tell
+
+
+def _folders(out: Path, count: int) -> list[Path]:
+    return [out] if count == 1 else [out / f"trajectory_{k + 1}" for k in range(count)]

@@ -1,0 +1,240 @@
+"""The search behind a design: several starts, IPOPT from each, the best one repaired and checked on a fine grid."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from casysid.arrays import Array
+from casysid.excitation.blocks import Block, TorqueBlock
+from casysid.excitation.feasible import TIGHTENING, Standing, find_standing, random_start, small_start
+from casysid.excitation.problem import ExcitationProblem
+from casysid.excitation.program import Evaluation, Program
+from casysid.excitation.results import DesignStatus, DesignStep, ExcitationDesign, Progress, StartReport
+from casysid.excitation.series import ExcitationTrajectory
+from casysid.excitation.verification import Verification, verify
+from casysid.nlp import NlpIteration, NlpSettings, solve_nlp
+
+DRAWS = 12
+"""Random motions looked at for each start; the best become starts."""
+STRIDE = 2
+"""The optimiser looks at joints' limits at every so many instants of the design grid."""
+WATCHED = 0.4
+"""The optimiser looks at the torque of joints where random motions take more than this share of the limit."""
+NEARLY = 0.997
+"""A motion that passes the check when made smaller by this factor needs no repair."""
+REPAIRS = 2
+"""How often the best motion is optimised again, with more instants where it went beyond limits."""
+FEASIBLE = 1e-6
+"""Largest violation, as a share of the limits and beyond the tightening, of what counts as keeping them."""
+SHRINKING = 1.2
+"""A motion beyond its limits is made smaller by so many times the share by which it is, until it passes the check."""
+
+
+class Search:
+    """One run: what was found so far, so that it can end at any time."""
+
+    def __init__(
+        self,
+        problem: ExcitationProblem,
+        starts: int,
+        seed: int,
+        settings: NlpSettings,
+        progress: Progress | None,
+    ) -> None:
+        """Nothing found yet."""
+        self.problem, self.starts, self.seed, self.settings = problem, starts, seed, settings
+        self.progress, self.began, self.stopped = progress, time.perf_counter(), False
+        self.reports: list[StartReport] = []
+        self.evaluations: list[Evaluation] = []
+        self.found: list[tuple[float, Array]] = []  # the best of each start that keeps the limits of its grid
+
+    def run(self) -> ExcitationDesign:
+        """Search, then make sure of the limits."""
+        standing = find_standing(self.problem, self.seed)
+        safe = small_start(self.problem, standing, self.seed)
+        every = self._evaluation(self.problem.blocks)
+        self.found.append((every.objective(safe), safe))
+        try:
+            finished = self._search(standing, safe, every)
+            status = DesignStatus.CONVERGED if finished else DesignStatus.UNFINISHED
+        except KeyboardInterrupt:
+            status = DesignStatus.INTERRUPTED
+        if self.stopped:
+            status = DesignStatus.INTERRUPTED
+        trajectory, shrink = self._best_within_limits(every)
+        return ExcitationDesign(
+            problem=self.problem,
+            trajectory=trajectory,
+            status=status,
+            starts=tuple(self.reports),
+            evaluations={name: sum(one.counts[name] for one in self.evaluations) for name in every.counts},
+            seconds=time.perf_counter() - self.began,
+            shrink=shrink,
+        )
+
+    def _search(self, standing: Standing, safe: Array, every: Evaluation) -> bool:
+        """Every start, then the best again where it goes beyond limits between instants; whether that converged."""
+        drawn = self._draw(standing, every) if self.starts > 1 else []
+        blocks = self._watched([safe, *drawn])
+        program = Program(self._evaluation(blocks, STRIDE), self.settings)
+        converged = [self._solve(program, k + 1, x) for k, x in enumerate([safe, *drawn[: self.starts - 1]])]
+        finished = any(converged)
+        extra = np.empty(0)
+        for _ in range(REPAIRS):
+            best = min(self.found, key=lambda one: one[0])
+            smaller = _shrunk(self.problem, best[1], NEARLY)
+            if self._over() or smaller is not None:
+                break
+            checked = verify(self.problem, self.problem.trajectory(best[1]))
+            extra = np.append(extra, _instants(self.problem, checked))
+            self.found = [one for one in self.found if one is not best]
+            self._keep_smaller(best[1], every)
+            evaluation = self._evaluation(self._watched([safe, *drawn], checked), 1, extra)
+            self._solve(Program(evaluation, self._repairing), self.starts + 1, best[1])
+        return finished and not self._over()
+
+    @property
+    def _repairing(self) -> NlpSettings:
+        return dataclasses.replace(self.settings, barrier=1e-3, max_iterations=min(self.settings.max_iterations, 60))
+
+    def _keep_smaller(self, x: Array, every: Evaluation) -> None:
+        """Remember the motion made smaller until it passes, in case nothing better comes."""
+        smaller = _shrunk(self.problem, x)
+        if smaller is not None:
+            self.found.append((every.objective(smaller[0]), smaller[0]))
+
+    def _evaluation(self, blocks: Sequence[Block], stride: int = 1, extra: Array | None = None) -> Evaluation:
+        self.evaluations.append(Evaluation(self.problem, blocks, stride, extra))
+        return self.evaluations[-1]
+
+    def _draw(self, standing: Standing, every: Evaluation) -> list[Array]:
+        """Random motions, best first."""
+        rng = np.random.default_rng(self.seed)
+        drawn = [random_start(self.problem, every, standing, rng) for _ in range(DRAWS * (self.starts - 1))]
+        feasible = [x for x in drawn if x is not None]
+        values = [every.objective(x) for x in feasible]
+        self.found += [(values[k], feasible[k]) for k in np.argsort(values)[:1]]
+        return [feasible[k] for k in np.argsort(values)]
+
+    def _watched(self, motions: list[Array], checked: Verification | None = None) -> list[Block]:
+        """All constraints but the torque of joints that stay far from their limits."""
+        violated = {one.label for one in checked.violations if one.kind == "torque"} if checked else set()
+        blocks: list[Block | None] = []
+        for block in self.problem.blocks:
+            if isinstance(block, TorqueBlock):
+                grid = self.problem.series.grid(self.problem.samples)
+                peak = [np.abs(block.measure(self.problem.trajectory(x).motion(grid))).max(axis=0) for x in motions[:8]]
+                wanted = np.max(peak, axis=0) > WATCHED * block.limit
+                blocks.append(block.watching(wanted | np.array([label in violated for label in block.labels])))
+            else:
+                blocks.append(block)
+        return [block for block in blocks if block is not None]
+
+    def _solve(self, program: Program, number: int, x: Array) -> bool:
+        """Whether IPOPT converged; the best motion on its way that keeps the limits is remembered."""
+        if self._over():
+            return False
+        best: tuple[float, Array] = np.inf, x
+
+        def tell(iteration: NlpIteration) -> bool:
+            nonlocal best
+            if iteration.infeasibility <= FEASIBLE and iteration.objective < best[0]:
+                best = iteration.objective, iteration.variables
+            self.stopped = self.stopped or self._tell(number, iteration, best[0])
+            return self._over()
+
+        start_lower, start_upper = _bounds(self.problem)
+        lower, upper = program.evaluation.bounds(TIGHTENING)
+        first = program.evaluation.objective(x)
+        try:
+            solution = solve_nlp(
+                program.nlp,
+                x,
+                lower=start_lower,
+                upper=start_upper,
+                constraint_lower=lower,
+                constraint_upper=upper,
+                progress=tell,
+            )
+            if solution.infeasibility <= FEASIBLE and solution.objective < best[0]:
+                best = solution.objective, solution.variables
+        finally:
+            if np.isfinite(best[0]):
+                self.found.append(best)
+        self.reports.append(
+            StartReport(
+                status=solution.status,
+                first=first,
+                objective=best[0],
+                iterations=solution.iterations,
+                seconds=solution.seconds,
+            )
+        )
+        return solution.success
+
+    def _over(self) -> bool:
+        return self.stopped or time.perf_counter() - self.began > self.settings.max_seconds
+
+    def _tell(self, number: int, iteration: NlpIteration, best: float) -> bool:
+        if self.progress is None:
+            return False
+        step = DesignStep(
+            start=number,
+            starts=self.starts,
+            step=iteration.step,
+            objective=iteration.objective,
+            infeasibility=iteration.infeasibility,
+            best=min(best, *(objective for objective, _ in self.found)),
+            seconds=time.perf_counter() - self.began,
+        )
+        return bool(self.progress(step))
+
+    def _best_within_limits(self, every: Evaluation) -> tuple[ExcitationTrajectory, float]:
+        """Of all that was found, made smaller where needed, the best that passes the check; in the end the safe one."""
+        best: tuple[float, Array, float] = np.inf, self.found[0][1], 0.0
+        for objective, x in sorted(self.found, key=lambda one: one[0]):
+            if objective >= best[0]:
+                break
+            smaller = _shrunk(self.problem, x)
+            if smaller is not None and (value := every.objective(smaller[0])) < best[0]:
+                best = value, *smaller
+        return self.problem.trajectory(best[1]), best[2]
+
+
+def _shrunk(problem: ExcitationProblem, x: Array, least: float = 0.5) -> tuple[Array, float] | None:
+    """The motion, made smaller about its middle until it passes the check, and the factor; None if it never does."""
+    n = len(problem.robot.dofs)
+    values = x.reshape(n, -1)
+    anchor = np.zeros_like(values)
+    anchor[:, 0] = values[:, 0]
+    if problem.start is None:
+        position = problem.trajectory(x).motion(problem.series.grid(problem.samples)).position
+        anchor[:, 0] = (position.max(axis=0) + position.min(axis=0)) / 2.0 / problem.limits.half_range
+    factor = 1.0
+    while factor >= least:
+        smaller = (anchor + factor * (values - anchor)).ravel()
+        checked = verify(problem, problem.trajectory(smaller))
+        if checked.passed:
+            return smaller, factor
+        factor *= 1.0 - min(SHRINKING * -checked.violations[0].share + 5e-4, 0.2)
+    return None
+
+
+def _instants(problem: ExcitationProblem, checked: Verification) -> Array:
+    """Where limits are violated, and just before and after."""
+    step = problem.series.period / (4 * problem.samples)
+    worst = np.array([one.instant for one in checked.violations])
+    return np.unique(np.concatenate([worst - step, worst, worst + step]) % problem.series.period)
+
+
+def _bounds(problem: ExcitationProblem) -> tuple[Array, Array]:
+    """Bounds of the variables: a start that was given stays, everything else is free."""
+    width = 1 + problem.series.size
+    lower, upper = (np.full(len(problem.limits.lower) * width, side) for side in (-np.inf, np.inf))
+    if problem.start is not None:
+        lower[::width] = upper[::width] = problem.start / problem.limits.half_range
+    return lower, upper
