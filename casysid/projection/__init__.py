@@ -17,6 +17,7 @@ from casysid.projection.knowledge import (
 from casysid.projection.layout import ParameterLike
 from casysid.projection.problem import FLOOR, PRIOR_BUDGET, ProjectionProblem, build_projection
 from casysid.projection.results import ProjectionResult, ProjectionStatus, Solver
+from casysid.projection.sampling import project_samples
 
 __all__ = [
     "FLOOR",
@@ -35,5 +36,6 @@ __all__ = [
     "link_mass",
     "parameter_within",
     "project",
+    "project_samples",
     "total_mass",
 ]

@@ -22,6 +22,7 @@ from casysid.projection import (
     link_mass,
     parameter_within,
     project,
+    project_samples,
     total_mass,
 )
 
@@ -278,3 +279,30 @@ def test_parameters_without_links_are_only_clipped():
     columns = [type("Column", (), {"name": n, "owner": n, "kind": "viscous", "non_negative": True}) for n in "ab"]
     result = project(build_projection(columns), [1.0, -1.0], np.diag([1.0, 2.0]))
     np.testing.assert_allclose(result.parameters, [1.0, 0.0], atol=1e-4)
+
+
+def test_samples_are_consistent_and_spread_around_the_projection(problems, experiment):
+    data = experiment(seed=0, noise=0.3)
+    result = run(problems(), data)
+    rng = np.random.default_rng(0)
+    values, vectors = np.linalg.eigh(data.equations.xx)
+    seen = values > 1e-9 * values[-1]
+    noise = (vectors[:, seen] / np.sqrt(values[seen])) @ rng.normal(size=(seen.sum(), 8))
+    energy = {"residual_energy": data.residual_energy}
+    samples = project_samples(problems(), data.estimate + noise.T, data.equations.xx, data.prior, result, **energy)
+    assert is_consistent(samples[:, :30].reshape(-1, 10)).all()
+    away = samples - result.parameters
+    assert np.einsum("nm,mk,nk->n", away, data.equations.xx, away).max() < 4 * seen.sum()
+    (same,) = project_samples(problems(), data.estimate[None], data.equations.xx, data.prior, result, **energy)
+    np.testing.assert_allclose(same, result.parameters, atol=1e-2)
+
+
+def test_samples_without_an_answer_are_counted(problems, experiment, monkeypatch):
+    data = experiment(seed=0, noise=0.3)
+    result = run(problems(), data)
+    monkeypatch.setattr("casysid.projection.certificate.solve_convex", lambda *_: None)
+    with pytest.warns(CasysidWarning, match="2 of 2 samples have no answer"):
+        samples = project_samples(problems(), [data.estimate] * 2, data.equations.xx, data.prior, result)
+    assert np.isnan(samples).all()
+    with pytest.raises(ParameterError, match=r"samples must have shape \(n, 36\)"):
+        project_samples(problems(), data.estimate, data.equations.xx, data.prior, result)
