@@ -12,7 +12,7 @@ import numpy as np
 
 from casysid.arrays import Array
 
-_HALVINGS = 26
+_HALVINGS = 45
 _TINY = 1e-12
 
 
@@ -103,4 +103,4 @@ def _apart(first: Array, second: Array) -> Closest:
 
 
 def _dot(x: Array, y: Array) -> Array:
-    return np.asarray((x * y).sum(axis=-1))
+    return np.asarray(np.einsum("...i,...i->...", x, y))

@@ -69,7 +69,6 @@ class Evaluation:
 
     def objective(self, x: Array) -> float:
         """The criterion."""
-        self.counts["objective"] += 1
         return float(self._criterion(x)[0])
 
     def gradient(self, x: Array) -> Array:
@@ -84,11 +83,13 @@ class Evaluation:
 
     def constraints(self, x: Array) -> Array:
         """Instant by instant within each block."""
-        self.counts["constraints"] += 1
-        parts = [
-            block.constrain(self._motion(grid, x)).ravel() for block, grid in zip(self.blocks, self._grids, strict=True)
-        ]
-        return np.concatenate(parts or [np.empty(0)])
+        motions = [self._motion(grid, x) for grid in self._grids]
+        if "constraints" not in self._known:
+            self.counts["constraints"] += 1
+            parts = [block.constrain(motion).ravel() for block, motion in zip(self.blocks, motions, strict=True)]
+            self._known["constraints"] = np.concatenate(parts or [np.empty(0)])
+        values: Array = self._known["constraints"]
+        return values
 
     def bounds(self, tightening: float) -> tuple[Array, Array]:
         """Of the constraints, moved inwards."""
@@ -133,6 +134,7 @@ class Evaluation:
     def _criterion(self, x: Array) -> tuple[float, Array, list[Array]]:
         motion, problem = self._motion(self._grid, x), self.problem
         if "criterion" not in self._known:
+            self.counts["objective"] += 1
             information, rows = problem.information.sampled(motion)
             total = problem.known + information * (problem.measured / problem.samples)
             total[np.diag_indices_from(total)] += FLOOR * problem.measured

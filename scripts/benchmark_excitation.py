@@ -1,0 +1,257 @@
+"""Times the design of excitation, compares it with rivals on the same problem, and checks every motion it returns.
+
+    python scripts/benchmark_excitation.py --json excitation.json [--part speed rivals safety] [--models DIR]
+
+``speed``: four starts on bundled models (and on a URDF given with --robot), wall and processor seconds, evaluations,
+gradients against finite differences. ``rivals``: log det and condition number of the same weighted base information
+against the best of 200 random feasible motions and against SLSQP with finite differences, which is given ten times the
+time. ``safety``: violations on a grid finer than ten times that of the design, over robots and seeds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from scipy.optimize import minimize
+
+from casysid.bundled import find_model
+from casysid.errors import CasysidError, CasysidWarning
+from casysid.excitation import ConditionNumber, FourierSeries, build_excitation, design_excitation
+from casysid.excitation.feasible import TIGHTENING, find_standing, random_start, small_start
+from casysid.excitation.program import Evaluation
+from casysid.excitation.search import STRIDE
+from casysid.robot import Robot
+
+SERIES = FourierSeries(10.0, 5)
+RANDOM = 200
+
+
+class Clock:
+    """Wall and processor seconds since it was made."""
+
+    def __init__(self):
+        self.began = time.perf_counter(), time.process_time()
+
+    def read(self):
+        """Since then."""
+        return {"wall": time.perf_counter() - self.began[0], "cpu": time.process_time() - self.began[1]}
+
+
+def gradient_error(problem, seed=0):
+    """Largest relative error of objective's and constraints' slopes along a random direction."""
+    rng = np.random.default_rng(seed)
+    evaluation = Evaluation(problem, problem.blocks)
+    x = small_start(problem, find_standing(problem, seed), seed)
+    direction, h = rng.normal(size=len(x)), 1e-6
+    gradient = evaluation.gradient(x)
+    jacobian = np.zeros((len(evaluation.constraints(x)), len(x)))
+    jacobian[evaluation.pattern] = evaluation.jacobian(x)
+    slope = (evaluation.objective(x + h * direction) - evaluation.objective(x - h * direction)) / (2 * h)
+    slopes = (evaluation.constraints(x + h * direction) - evaluation.constraints(x - h * direction)) / (2 * h)
+    return {
+        "objective": abs(slope - gradient @ direction) / abs(gradient @ direction),
+        "constraints": float(np.abs(slopes - jacobian @ direction).max() / np.abs(slopes).max()),
+    }
+
+
+def quality(problem, trajectory):
+    information = problem.gained(trajectory, 10)
+    return {"log_det": float(np.linalg.slogdet(information)[1]), "condition": float(np.linalg.cond(information))}
+
+
+def run_speed(robots):
+    rows = []
+    for name, path in robots.items():
+        clock = Clock()
+        problem = build_excitation(Robot.from_file(path), series=SERIES)
+        design = design_excitation(problem, starts=4)
+        rows.append(
+            {
+                "robot": name,
+                "joints": problem.robot.nv,
+                "base_parameters": problem.information.size,
+                **clock.read(),
+                "status": design.status.name,
+                "starts": [f"{one.status.name} {one.iterations}" for one in design.starts],
+                "evaluations": design.evaluations,
+                "gradient_error": gradient_error(problem),
+                **quality(problem, design.trajectory),
+                "shrink": design.shrink,
+                "passed": design.check().passed,
+            }
+        )
+        print(
+            f"{name:10s} {problem.robot.nv:2d} joints, {problem.information.size:3d} base parameters: "
+            f"{rows[-1]['wall']:6.1f} s wall, {rows[-1]['cpu']:6.1f} s cpu, {design.status.name}, "
+            f"{sum(one.iterations for one in design.starts)} iterations, log det {rows[-1]['log_det']:.1f}, "
+            f"condition {rows[-1]['condition']:.3g}, kept {rows[-1]['passed']}",
+            flush=True,
+        )
+    return rows
+
+
+def random_best(problem):
+    """Best log det and best condition number of 200 random motions that keep the limits of the design grid."""
+    evaluation = Evaluation(problem, problem.blocks)
+    standing, rng = find_standing(problem, 0), np.random.default_rng(1)
+    found = []
+    while len(found) < RANDOM:
+        x = random_start(problem, evaluation, standing, rng)
+        if x is not None:
+            found.append(quality(problem, problem.trajectory(x)))
+    return {"log_det": max(one["log_det"] for one in found), "condition": min(one["condition"] for one in found)}
+
+
+def slsqp(problem, seconds):
+    """SLSQP by finite differences on the same variables, objective and constraints, until the time is over."""
+    evaluation = Evaluation(problem, problem.blocks, STRIDE)
+    lower, upper = evaluation.bounds(TIGHTENING)
+    finite = np.isfinite(lower), np.isfinite(upper)
+    began, best = time.process_time(), {"objective": np.inf, "x": None, "iterations": 0}
+
+    def room(x):
+        values = evaluation.constraints(x)
+        return np.concatenate([(values - lower)[finite[0]], (upper - values)[finite[1]]])
+
+    def watch(x):
+        best["iterations"] += 1
+        value = evaluation.objective(x)
+        if value < best["objective"] and room(x).min() >= -1e-6:
+            best.update(objective=value, x=x.copy())
+        if time.process_time() - began > seconds:
+            raise StopIteration
+
+    start = small_start(problem, find_standing(problem, 0), 0)
+    try:
+        minimize(
+            evaluation.objective,
+            start,
+            method="SLSQP",
+            callback=watch,
+            options={"maxiter": 1000, "ftol": 1e-6},
+            constraints={"type": "ineq", "fun": room},
+        )
+    except StopIteration:
+        pass
+    answer = {"cpu": time.process_time() - began, "iterations": best["iterations"]}
+    if best["x"] is None:
+        return {**answer, "log_det": -np.inf, "condition": np.inf}
+    return {**answer, **quality(problem, problem.trajectory(best["x"]))}
+
+
+def run_rivals(robots, budget):
+    rows = []
+    for name, path in robots.items():
+        problem = build_excitation(Robot.from_file(path), series=SERIES)
+        clock = Clock()
+        design = design_excitation(problem, starts=4)
+        ours = {**clock.read(), **quality(problem, design.trajectory)}
+        clock = Clock()
+        conditioned = design_excitation(problem.judged_by(ConditionNumber()), starts=4)
+        second = {**clock.read(), **quality(problem, conditioned.trajectory)}
+        given = min(10.0 * ours["cpu"], budget)
+        row = {
+            "robot": name,
+            "D": ours,
+            "condition number": second,
+            "random": random_best(problem),
+            "SLSQP": {**slsqp(problem, given), "share_of_ten_times": given / (10.0 * ours["cpu"])},
+        }
+        rows.append(row)
+        for rival in ("D", "condition number", "random", "SLSQP"):
+            one = row[rival]
+            figures = f"log det {one['log_det']:8.2f}  condition {one['condition']:10.4g}"
+            print(f"{name:10s} {rival:17s} {figures}  cpu {one.get('cpu', float('nan')):7.1f} s", flush=True)
+    return rows
+
+
+def random_tree(rng, joints):
+    """Revolute joints in a tree, links of some decimetres, usual limits."""
+    model = pin.Model()
+    for k in range(joints):
+        parent = int(rng.integers(max(0, k - 1), k + 1))
+        place = pin.SE3(pin.exp3(rng.integers(4) * np.pi / 2 * np.eye(3)[rng.integers(3)]), rng.normal(size=3) * 0.2)
+        joint = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)[rng.integers(3)]()
+        limit = np.ones(1)
+        effort = limit * 200.0 * 0.7**k
+        body = model.addJoint(parent, joint, place, f"joint_{k + 1}", effort, 3.0 * limit, -2.0 * limit, 2.0 * limit)
+        root = rng.normal(size=(3, 3)) * 0.1
+        second = root @ root.T + 1e-3 * np.eye(3)
+        mass = 3.0 * 0.8**k
+        body_inertia = pin.Inertia(mass, rng.normal(size=3) * 0.05, mass * (np.trace(second) * np.eye(3) - second))
+        model.appendBodyToJoint(body, body_inertia, pin.SE3.Identity())
+    return Robot.from_pin(model, name=f"tree of {joints}")
+
+
+def run_safety(robots, cases):
+    """Violations at 10, 17 and 40 times the instants of the design grid."""
+    rng = np.random.default_rng(0)
+    made = {
+        f"{name} seed {seed}": (lambda path=path: Robot.from_file(path), seed)
+        for seed in (0, 1)
+        for name, path in robots.items()
+    }
+    seed = 0
+    while len(made) < cases:
+        made[f"tree {seed}"] = (lambda joints=2 + seed % 4: random_tree(rng, joints), seed)
+        seed += 1
+    rows = []
+    for name, (make, seed) in list(made.items())[:cases]:
+        clock = Clock()
+        try:
+            problem = build_excitation(make())
+            design = design_excitation(problem, starts=2, seed=seed, max_iterations=100)
+        except CasysidError as error:
+            rows.append({"case": name, "refused": str(error)})
+            print(f"{name:24s} refused: {error}", flush=True)
+            continue
+        checks = [design.check(factor * problem.samples) for factor in (10, 17, 40)]
+        violations = [len(check.violations) for check in checks]
+        rows.append(
+            {
+                "case": name,
+                "violations": violations,
+                "status": design.status.name,
+                "shrink": design.shrink,
+                "log_det": design.log_det,
+                **clock.read(),
+            }
+        )
+        print(
+            f"{name:24s} violations {violations}, {design.status.name}, shrink {design.shrink:.4f}, "
+            f"log det {design.log_det:.1f}, {rows[-1]['cpu']:.1f} s cpu",
+            flush=True,
+        )
+    return rows
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, help="write the figures here")
+    parser.add_argument("--part", nargs="+", default=["speed", "rivals", "safety"])
+    parser.add_argument("--robot", nargs="*", default=[], help="further models, as NAME=FILE")
+    parser.add_argument("--cases", type=int, default=20, help="of the safety part")
+    parser.add_argument("--budget", type=float, default=120.0, help="processor seconds that SLSQP gets at most")
+    arguments = parser.parse_args()
+    warnings.simplefilter("ignore", CasysidWarning)
+    more = {name: Path(path) for name, _, path in (text.partition("=") for text in arguments.robot)}
+    bundled = {name: find_model(name) for name in ("two_link", "scara", "head", "arm")}
+    figures = {}
+    if "speed" in arguments.part:
+        figures["speed"] = run_speed(bundled | more)
+    if "rivals" in arguments.part:
+        figures["rivals"] = run_rivals({name: bundled[name] for name in ("two_link", "scara")}, arguments.budget)
+    if "safety" in arguments.part:
+        figures["safety"] = run_safety(bundled | more, arguments.cases)
+    if arguments.json:
+        arguments.json.write_text(json.dumps(figures, indent=1))
+
+
+if __name__ == "__main__":
+    main()
