@@ -14,7 +14,7 @@ from casysid.cli.options import GravityOption, LockOption, RobotArgument, load_r
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from casysid.excitation import ExcitationProblem, FourierSeries, HalfSpace, JointLimits
+    from casysid.excitation import Box, ExcitationProblem, FourierSeries, HalfSpace, JointLimits, KeepInBlock
     from casysid.excitation.results import Progress
     from casysid.robot import Robot
 
@@ -50,6 +50,20 @@ def excite(
     torque_share: Annotated[float, typer.Option(help="Share of the effort limits to use.")] = 0.8,
     clearance: Annotated[float, typer.Option(help="Distance to keep between links and to the floor [m].")] = 0.01,
     floor: Annotated[float | None, typer.Option(help="Height of a floor to stay above [m].")] = None,
+    box: Annotated[
+        list[str] | None, typer.Option(metavar="X,Y,Z,X,Y,Z", help="Corners of an obstacle [m]. Repeatable.")
+    ] = None,
+    wall: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NX,NY,NZ,D", help="Stay where n·x >= d; n points away from the wall. Repeatable."),
+    ] = None,
+    keep_in: Annotated[
+        list[str] | None,
+        typer.Option("--keep-in", metavar="LINK=X,Y,Z,X,Y,Z", help="Box in which a link's frame stays. Repeatable."),
+    ] = None,
+    start: Annotated[
+        str | None, typer.Option(metavar="Q1,Q2,...", help="Positions to start from [rad, m]; default: free.")
+    ] = None,
     starts: Annotated[int, typer.Option(help="Starts of the search.")] = 4,
     seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
     gravity: GravityOption = None,
@@ -80,7 +94,9 @@ def excite(
             rate=rate,
             limits=limits,
             clearance=clearance,
-            obstacles=_floor(floor),
+            obstacles=_obstacles(floor, wall or [], box or []),
+            keep_in=_keep_in(model, keep_in or []),
+            start=None if start is None else _numbers("--start", start, model.nv),
         )
         problem = _informed(model, problem, criterion, log or [])
         with progress_bar(console) as progress:
@@ -106,12 +122,44 @@ def _series(limits: JointLimits, rate: float, period: float | None, harmonics: i
     )
 
 
-def _floor(height: float | None) -> tuple[HalfSpace, ...]:
+def _obstacles(floor: float | None, walls: list[str], boxes: list[str]) -> list[HalfSpace | Box]:
     import numpy as np
 
-    from casysid.excitation import HalfSpace
+    from casysid.excitation import Box, HalfSpace
 
-    return () if height is None else (HalfSpace("floor", np.array([0.0, 0.0, 1.0]), height),)
+    found: list[HalfSpace | Box] = []
+    if floor is not None:
+        found.append(HalfSpace("floor", np.array([0.0, 0.0, 1.0]), floor))
+    for k, text in enumerate(walls, 1):
+        *normal, offset = _numbers("--wall", text, 4)
+        found.append(HalfSpace(f"wall {k}", np.array(normal), offset))
+    for k, text in enumerate(boxes, 1):
+        corners = np.array(_numbers("--box", text, 6)).reshape(2, 3)
+        found.append(Box(f"box {k}", corners.min(axis=0), corners.max(axis=0)))
+    return found
+
+
+def _keep_in(robot: Robot, texts: list[str]) -> list[KeepInBlock]:
+    from casysid.excitation import keep_in
+
+    found = []
+    for text in texts:
+        link, _, numbers = text.rpartition("=")
+        corners = _numbers("--keep-in", numbers, 6)
+        found.append(keep_in(robot, link, corners[:3], corners[3:]))
+    return found
+
+
+def _numbers(option: str, text: str, count: int) -> list[float]:
+    from casysid.errors import ParameterError
+
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != count:
+        raise ParameterError(f"{option} wants {count} numbers with commas between them; got {text!r}")
+    return values
 
 
 def _informed(robot: Robot, problem: ExcitationProblem, choice: CriterionChoice, logs: list[Path]) -> ExcitationProblem:
