@@ -16,6 +16,7 @@ ORDER = (
     ("signals", "moments", "accumulation"),
     ("identifiability",),
     ("estimation", "projection", "excitation"),
+    ("uncertainty",),
     ("identification",),
     ("simulation",),
     ("validation",),

@@ -13,9 +13,13 @@ from types import MappingProxyType
 from typing import ClassVar, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.arrays import Array, frozen
 from casysid.moments import Moments
+
+LEVERAGE_TOLERANCE = 1e-6
+"""A coordinate with more than this share of its squared length in unseen directions is unseen."""
 
 
 class Status(enum.Enum):
@@ -24,6 +28,41 @@ class Status(enum.Enum):
     CONVERGED = "converged"
     MAX_ITERATIONS = "reached the largest number of iterations before the tolerance"
     DEGENERATE = "the data leave nothing to estimate"
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """Covariance of parameters as far as the data see them, under coloured residuals.
+
+    Attributes:
+        covariance: Finite, shape (p, p): of every combination of parameters that the data see; others are left out.
+        hidden: Basis of the directions that the data do not see, shape (p, p - r), orthonormal in units of ``scale``.
+        scale: Of each parameter, shape (p,): what makes torque of unit energy.
+        freedom: Degrees of freedom behind the covariance: intervals take Student's quantile; inf where not known.
+    """
+
+    covariance: Array
+    hidden: Array
+    scale: Array
+    freedom: float
+
+    def __post_init__(self) -> None:
+        for name in ("covariance", "hidden", "scale"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def sees(self, gradients: Array) -> npt.NDArray[np.bool_]:
+        """Whether the data tell quantities of the given gradients, shape (k, p); a boolean for each."""
+        scaled = gradients * self.scale
+        lost = np.sum((scaled @ self.hidden) ** 2, axis=1)
+        return np.asarray(lost <= LEVERAGE_TOLERANCE * np.sum(scaled**2, axis=1))
+
+    @property
+    def marked(self) -> Array:
+        """The covariance with infinite variance for parameters that the data do not tell by themselves, (p, p)."""
+        covariance, unseen = self.covariance.copy(), ~self.sees(np.eye(len(self.scale)))
+        covariance[unseen, :] = covariance[:, unseen] = 0.0
+        covariance[unseen, unseen] = np.inf
+        return covariance
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -39,6 +78,7 @@ class Estimate:
         rank: Number of directions that the data decided.
         status: Why it stopped.
         diagnostics: Further figures by name (strengths, bounds, iterations).
+        spread: The covariance of combinations, from blocks of time; None where the method has only ``covariance``.
     """
 
     method: str
@@ -49,6 +89,7 @@ class Estimate:
     rank: int
     status: Status
     diagnostics: Mapping[str, float] = field(default_factory=dict)
+    spread: Spread | None = None
 
     def __post_init__(self) -> None:
         for name in ("parameters", "covariance", "metric", "noise_std"):

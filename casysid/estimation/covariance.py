@@ -1,61 +1,180 @@
 """Standard errors that survive coloured residuals.
 
 Residuals of a robot's torque are never white: friction, elasticity and the low-pass colour them, and the textbook
-``σ² (XᵀX)⁻¹`` is far too small. Scores summed over blocks of time carry that colour. One inflation factor by joint, the
-ratio of the scores' variance between blocks to what white residuals would give, pooled over all seen directions, is
-stable even when there are fewer blocks than parameters, where the plain sandwich would be singular.
+``σ² (XᵀX)⁻¹`` is far too small. Scores ``Σ x w (y - xᵀθ)`` summed over blocks of time carry that colour, and two
+estimates of their covariance are drawn from them: block by block without any model, unbiased but of few degrees of
+freedom; and as ``κ_j`` times that of white residuals, one inflation for each joint, which is stable but holds that all
+directions are inflated alike. The answer weighs the two by how much the directions really differ.
+
+Everything is computed in directions of unit information, ``Wᵀ H W = 1``, where the scores of least squares on white
+residuals have unit covariance.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from scipy.special import digamma, polygamma
 
 from casysid.arrays import Array
-from casysid.estimation.standardise import LEVERAGE_TOLERANCE, SPECTRUM_TOLERANCE
+from casysid.estimation.base import Spread
 from casysid.moments import Moments
+
+RANK_TOLERANCE = 1e-9
+"""Eigenvalues of the information, scaled to unit diagonal, below this fraction of the largest are no knowledge."""
+HEAVIEST_BLOCK = 0.9
+"""A direction of which one block holds more than this share says nothing of its own spread from block to block."""
+MOST_POOLED = 2.0
+"""The pooled estimate never counts for more than so many times the degrees of freedom of the direct one."""
 
 
 def block_covariance(moments: Moments, parameters: Array, weights: Array) -> Array:
     """Covariance of weighted least squares, shape (p, p); infinite variance for what the data do not see.
 
+    Arguments as for :func:`covariance_from_blocks`.
+    """
+    return covariance_from_blocks(moments, parameters, weights).marked
+
+
+def covariance_from_blocks(moments: Moments, parameters: Array, weights: Array, pull: Array | None = None) -> Spread:
+    """Covariance of least squares, or of ridge with the error that its pull to the prior brings.
+
+    Ridge's pull is what a Gaussian prior of the parameters would give, and is taken as one: to the noise comes the
+    spread about the prior that the strength stands for, ``C = (H + P)⁻¹ (M + κ P) (H + P)⁻¹`` with the mean inflation
+    ``κ``. For white residuals this is the posterior covariance.
+
     Args:
         moments: The fitted moments.
-        parameters: The least-squares ``θ``, shape (p,).
+        parameters: ``θ``, shape (p,).
         weights: Row weights by joint, shape (joints,).
+        pull: ``P``, shape (p, p): what a ridge adds to the weighted ``S_xx``; None for none.
 
-    Source: the cluster-robust sandwich (Liang and Zeger 1986), its meat modelled as ``Σ_j κ_j w_j² σ_j² S_j``.
+    Source: the cluster-robust sandwich (Liang and Zeger 1986) with the bias correction of Bell and McCaffrey (2002),
+    moderated as in Smyth (2004).
     """
-    gram = moments.gram.sum(axis=0)[:, :-1, :-1]  # (joints, p, p)
-    energy = np.einsum("j,jmm->m", weights, gram)
+    H = moments.pooled(weights).xx
+    energy = np.diag(H)
     live = energy > 0.0
-    scale = np.where(live, 1.0 / np.sqrt(np.where(live, energy, 1.0)), 0.0)
-    values, vectors = np.linalg.eigh(np.einsum("j,jmn->mn", weights, gram) * np.outer(scale, scale))
-    seen = values > SPECTRUM_TOLERANCE * max(values.max(initial=0.0), np.finfo(np.float64).tiny)
-    basis = scale[:, None] * vectors[:, seen]  # (p, r), standardised directions
-    freedom = np.maximum(
-        moments.count.sum(axis=0) * (1.0 - seen.sum() / max(moments.count.sum(), seen.sum() + 1.0)), 1.0
-    )
-    variance = moments.residual_energy(parameters).sum(axis=0) / freedom  # (joints,)
-    white = np.einsum("jmn,mr,ns->jrs", gram, basis, basis, optimize=True)  # (joints, r, r)
-    inflation = _inflation(moments, parameters, basis, values[seen], white, variance)
-    meat = np.einsum("j,jrs->rs", weights**2 * variance * inflation, white)
-    spread = basis / values[seen]
-    covariance = spread @ meat @ spread.T
-    unseen = ~live | (1.0 - np.einsum("mr,mr->m", vectors[:, seen], vectors[:, seen]) > LEVERAGE_TOLERANCE)
-    covariance[unseen, :] = covariance[:, unseen] = 0.0
-    covariance[unseen, unseen] = np.inf
-    return np.asarray(covariance)
+    inverse = np.where(live, 1.0 / np.sqrt(np.where(live, energy, 1.0)), 0.0)
+    values, vectors = np.linalg.eigh(H * np.outer(inverse, inverse))
+    known = values > RANK_TOLERANCE * max(values.max(initial=0.0), np.finfo(np.float64).tiny)
+    W = inverse[:, None] * vectors[:, known] / np.sqrt(values[known])  # (p, r)
+    scores = _scores_of(moments, parameters, weights, W)
+    M, freedom = _covariance_of_scores(moments, scores, parameters, weights)
+    scale = np.where(live, inverse, inverse.max(initial=0.0) or 1.0)
+    return Spread(W @ _pulled(M, W, pull) @ W.T, vectors[:, ~known], scale, freedom)
 
 
-def _inflation(
-    moments: Moments, parameters: Array, basis: Array, values: Array, white: Array, variance: Array
-) -> Array:
-    """Variance of the blocks' scores over white residuals', by joint, never below one; ones for a single block."""
-    if moments.blocks < 2:
-        return np.ones(len(variance))
-    residual = np.append(-parameters, 1.0)
-    scores = np.einsum("bjmn,n,mr->bjr", moments.gram[:, :, :-1, :], residual, basis, optimize=True)
-    scores = scores - scores.mean(axis=0)
-    energy = np.einsum("bjr,r->j", scores**2, 1.0 / values) * moments.blocks / (moments.blocks - 1)
-    expected = variance * np.einsum("jrr,r->j", white, 1.0 / values)
-    return np.asarray(np.maximum(energy / np.where(expected > 0.0, expected, np.inf), 1.0))
+def _pulled(meat: Array, W: Array, pull: Array | None) -> Array:
+    """``(1 + P)⁻¹ (M + κ P) (1 + P)⁻¹`` in directions of unit information."""
+    if pull is None or not len(meat):
+        return meat
+    P = W.T @ pull @ W
+    shrink = np.linalg.inv(np.eye(len(P)) + P)
+    return np.asarray(shrink @ (meat + np.trace(meat) / len(meat) * P) @ shrink)
+
+
+@dataclass(frozen=True, eq=False)
+class _Scores:
+    """Scores of least squares and their share of the information, in directions of unit information.
+
+    Attributes:
+        information: ``L_bj``, shape (blocks, joints, r, r); they add to the unit matrix.
+        values: ``g_bj``, shape (blocks, joints, r); they add to zero.
+    """
+
+    information: Array
+    values: Array
+
+
+def _scores_of(moments: Moments, parameters: Array, weights: Array, W: Array) -> _Scores:
+    gram = weights[:, None, None] * moments.gram[:, :, :-1, :]
+    information = np.matmul(W.T, np.matmul(gram[..., :-1], W))
+    values = np.matmul(gram, np.append(-parameters, 1.0)) @ W
+    return _Scores(information, values - information @ values.sum(axis=(0, 1)))  # moved to the least squares
+
+
+def _covariance_of_scores(moments: Moments, scores: _Scores, parameters: Array, weights: Array) -> tuple[Array, float]:
+    """Covariance of the summed scores, shape (r, r), and its degrees of freedom.
+
+    These are the blocks' own, as if nothing were pooled: what the pooled estimate gains in steadiness it may lose to
+    directions that differ.
+    """
+    rows, r = moments.count.sum(axis=0), scores.values.shape[2]
+    freedom = np.maximum(rows * (1.0 - r / max(rows.sum(), r + 1.0)), 1.0)
+    white = weights * moments.residual_energy(parameters).sum(axis=0) / freedom  # (joints,)
+    by_joint = scores.information.sum(axis=0)  # (joints, r, r)
+    if moments.blocks < 2 or r == 0:
+        return np.einsum("j,jrs->rs", white, by_joint), np.inf
+    inflation = np.maximum(_inflation(scores), white)
+    pooled = np.einsum("j,jrs->rs", inflation, by_joint)
+    information, values = scores.information.sum(axis=1), scores.values.sum(axis=1)
+    direct, remembered = _direct(information, values, pooled)
+    share = np.einsum("brr->br", information)
+    own = np.maximum(1.0 / np.maximum((share**2).sum(axis=0), 1.0 / moments.blocks) - 1.0, 1.0)
+    prior = _prior_freedom(np.diag(direct) / np.diag(pooled), own)
+    typical = float(np.mean(own))
+    meat = (prior * pooled + typical * direct) / (prior + typical)
+    return meat * remembered, typical
+
+
+def _inflation(scores: _Scores) -> Array:
+    """``κ_j``: variance of each joint's residuals over that of white ones of variance ``1/w_j``, shape (joints,).
+
+    ``E |g_bj|² = κ_j (tr L_bj - 2 tr L_bj²) + Σ_i κ_i tr(L_bj L_i L_bj)``, a linear system.
+    """
+    L, total = scores.information, scores.information.sum(axis=0)
+    square = np.matmul(L, L).sum(axis=0)
+    system = np.einsum("jrs,isr->ji", square, total)
+    system[np.diag_indices_from(system)] += np.einsum("jrr->j", total) - 2.0 * np.einsum("jrr->j", square)
+    energy = np.einsum("bjr,bjr->j", scores.values, scores.values)
+    return np.asarray(np.linalg.lstsq(system, energy, rcond=None)[0])
+
+
+def _direct(information: Array, values: Array, pooled: Array) -> tuple[Array, float]:
+    """Covariance from the blocks alone, shape (r, r), and the factor for what neighbouring blocks have in common.
+
+    Least squares takes from a block's scores what it can explain; ``(1 - L_b)^-½`` gives it back. What a block decides
+    nearly alone cannot be given back, and is taken from the pooled estimate.
+    """
+    share, vectors = np.linalg.eigh(information)  # (blocks, r), (blocks, r, r)
+    share = np.clip(share, 0.0, 1.0)
+    left = np.maximum(1.0 - share, 1.0 - HEAVIEST_BLOCK)
+    across = np.swapaxes(vectors, 1, 2)
+    restored = (vectors @ (left[:, :, None] ** -0.5 * (across @ values[:, :, None])))[..., 0]
+    kept = (vectors * (share * (1.0 - share) / left)[:, None, :]) @ across
+    lost = np.eye(values.shape[1]) - kept.sum(axis=0)
+    size, axes = np.linalg.eigh(0.5 * (pooled + pooled.T))
+    root = axes * np.sqrt(np.maximum(size, 0.0))  # denoised moments need not be positive definite
+    direct = restored.T @ restored + root @ _positive(lost) @ root.T
+    common = float(np.sum(values[:-1] * values[1:]))
+    expected = -float(np.einsum("brs,bsr->", information[:-1], information[1:] @ direct))
+    return direct, max(1.0 + 2.0 * (common - expected) / max(float(np.trace(direct)), 1e-300), 1.0)
+
+
+def _positive(matrix: Array) -> Array:
+    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
+
+
+def _prior_freedom(ratio: Array, freedom: Array) -> float:
+    """How many degrees of freedom the pooled estimate is worth, from how far directions differ (Smyth 2004, §6.2)."""
+    most = MOST_POOLED * float(np.mean(freedom))
+    if len(ratio) < 2:
+        return most
+    logs = np.log(np.maximum(ratio, 1e-12)) - digamma(freedom / 2.0) + np.log(freedom / 2.0)
+    differing = float(np.var(logs, ddof=1) - np.mean(polygamma(1, freedom / 2.0)))
+    return most if differing <= 0.0 else min(2.0 * _inverse_trigamma(differing), most)
+
+
+def _inverse_trigamma(value: float) -> float:
+    """``x`` of ``trigamma(x) = value`` by Newton's method (Smyth 2004, appendix)."""
+    x = 0.5 + 1.0 / value
+    for _ in range(20):
+        trigamma = float(polygamma(1, x))
+        step = trigamma * (1.0 - trigamma / value) / float(polygamma(2, x))
+        x += step
+        if -step < 1e-8 * x:
+            break
+    return x

@@ -9,7 +9,7 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.estimation.base import Estimate, Status
-from casysid.estimation.covariance import block_covariance
+from casysid.estimation.covariance import covariance_from_blocks
 from casysid.estimation.standardise import check_prior, solve_least_squares, standardise
 from casysid.moments import Moments
 
@@ -32,10 +32,12 @@ class OrdinaryLeastSquares:
         rows = moments.count.sum(axis=0)
         residual = shifted.residual_energy(step).sum(axis=0)
         noise_std = np.sqrt(residual / np.maximum(rows * (1.0 - rank / max(rows.sum(), rank + 1.0)), 1.0))
+        spread = covariance_from_blocks(shifted, step, np.ones(len(rows)))
         return Estimate(
             method=self.name,
             parameters=theta0 + step,
-            covariance=block_covariance(shifted, step, np.ones(len(rows))),
+            covariance=spread.marked,
+            spread=spread,
             metric=normal.xx,
             noise_std=noise_std,
             rank=rank,
@@ -61,10 +63,12 @@ class WeightedLeastSquares:
         coefficients, rank = solve_least_squares(normal.xx, normal.xy)
         theta = problem.restore(coefficients)
         shifted = moments.shifted(problem.prior)
+        spread = covariance_from_blocks(shifted, theta - problem.prior, problem.noise_std**-2.0)
         return Estimate(
             method=self.name,
             parameters=theta,
-            covariance=block_covariance(shifted, theta - problem.prior, problem.noise_std**-2.0),
+            covariance=spread.marked,
+            spread=spread,
             metric=problem.metric,
             noise_std=problem.noise_std,
             rank=rank,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,7 +9,8 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import ParameterError
-from casysid.estimation.base import Estimate
+from casysid.estimation.base import Estimate, Status
+from casysid.estimation.covariance import covariance_from_blocks
 from casysid.estimation.cross_validation import cross_validate
 from casysid.estimation.standardise import StandardisedProblem, seen_directions, standardise
 from casysid.moments import Moments, NormalEquations
@@ -25,10 +25,12 @@ class Ridge:
     Attributes:
         strength: Penalty on columns and target scaled to unit root mean square; None chooses it by cross-validation.
         folds: Contiguous folds of blocks in the cross-validation.
+        standard_errors: Whether the covariance is computed, which takes longer than the fit; infinite without.
     """
 
     strength: float | None = None
     folds: int = 5
+    standard_errors: bool = True
     name: ClassVar[str] = "ridge"
 
     def __post_init__(self) -> None:
@@ -53,14 +55,23 @@ class Ridge:
         values, vectors = seen_directions(normal.xx)
         shrunk = values + strength
         coefficients = vectors @ ((vectors.T @ normal.xy) / shrunk)
-        noise = max(normal.residual_energy(coefficients), 0.0) / max(float(problem.count.sum()), 1.0)
-        covariance = (vectors * (noise / shrunk)) @ vectors.T
-        freedom = float((values / shrunk).sum())
-        estimate = problem.to_estimate(
-            self.name, coefficients, covariance, diagnostics={"strength": strength, "effective_parameters": freedom}
-        )
         pull = strength * np.diag(np.diag(problem.metric))
-        return dataclasses.replace(estimate, metric=problem.metric + pull)
+        theta = problem.restore(coefficients)
+        spread = None
+        if self.standard_errors:
+            shifted, weights = moments.shifted(problem.prior), problem.noise_std**-2.0
+            spread = covariance_from_blocks(shifted, theta - problem.prior, weights, pull)
+        return Estimate(
+            method=self.name,
+            parameters=theta,
+            covariance=np.diag(np.full(len(theta), np.inf)) if spread is None else spread.marked,
+            spread=spread,
+            metric=problem.metric + pull,
+            noise_std=problem.noise_std,
+            rank=len(values),
+            status=Status.CONVERGED,
+            diagnostics={"strength": strength, "effective_parameters": float((values / shrunk).sum())},
+        )
 
 
 def choose_strength(problem: StandardisedProblem, folds: int) -> float:

@@ -15,13 +15,11 @@ import numpy.typing as npt
 
 from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError
-from casysid.estimation.base import Estimate, Status
+from casysid.estimation.base import LEVERAGE_TOLERANCE, Estimate, Status
 from casysid.moments import Moments, NormalEquations
 
 SPECTRUM_TOLERANCE = 1e-11
 """Eigenvalues of a Gram matrix below this fraction of the largest are rounding, not data."""
-LEVERAGE_TOLERANCE = 1e-6
-"""A coordinate with more than this share of its length in unseen directions is unseen."""
 ENERGY_TOLERANCE = 1e-24
 """A column with less than this fraction of the strongest column's energy is zero."""
 NOISE_FLOOR = 1e-6

@@ -22,6 +22,7 @@ from casysid.projection import ProjectionResult, build_projection, project
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.signals import Motion, motion_from_recording
+from casysid.uncertainty import ParameterUncertainty, propagate
 
 Progress = Callable[[str, float], None]
 """Told the stage and the share of it that is done."""
@@ -111,7 +112,7 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
     estimate = settings.method.estimate(problem.moments, regressor.prior)
     clock.lap("estimate")
     progress("estimate", 1.0)
-    projection = _project(problem, estimate, settings, progress)
+    projection, uncertainty = _project(problem, estimate, settings, progress)
     clock.lap("projection")
     progress("check", 0.0)
     parameters = estimate.parameters if projection is None else projection.parameters
@@ -123,6 +124,7 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
         regressor=regressor,
         estimate=estimate,
         projection=projection,
+        uncertainty=uncertainty,
         structural=preparation.structural,
         excited=excited_base_parameters(regressor, problem.moments, estimate.noise_std),
         unconstrained=torque_error(regressor, estimate.parameters, judged),
@@ -139,22 +141,19 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
 
 def _project(
     problem: LinearProblem, estimate: Estimate, settings: Settings, progress: Progress
-) -> ProjectionResult | None:
-    """The nearest consistent parameters in the estimate's own metric; None when consistency is not asked for."""
+) -> tuple[ProjectionResult | None, ParameterUncertainty]:
+    """The nearest consistent parameters in the estimate's own metric, None if not asked for; and how sure they are."""
+    regressor, moments = problem.regressor, problem.moments
     if settings.consistency is None:
-        return None
+        return None, propagate(estimate, moments, regressor.parameters)
     progress("projection", 0.0)
-    regressor = problem.regressor
-    weighted = problem.moments.pooled(estimate.noise_std**-2.0)
-    projection = project(
-        build_projection(regressor.parameters, consistency=settings.consistency, knowledge=settings.knowledge),
-        estimate.parameters,
-        estimate.metric,
-        regressor.prior,
-        residual_energy=weighted.residual_energy(estimate.parameters),
-    )
+    projection = build_projection(regressor.parameters, consistency=settings.consistency, knowledge=settings.knowledge)
+    energy = moments.pooled(estimate.noise_std**-2.0).residual_energy(estimate.parameters)
+    prior = regressor.prior
+    found = project(projection, estimate.parameters, estimate.metric, prior, residual_energy=energy)
+    uncertainty = propagate(estimate, moments, regressor.parameters, projection, found, prior, residual_energy=energy)
     progress("projection", 1.0)
-    return projection
+    return found, uncertainty
 
 
 def _settle(

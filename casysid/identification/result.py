@@ -20,6 +20,7 @@ from casysid.inertia import smallest_eigenvalue
 from casysid.projection import ProjectionResult
 from casysid.robot import Robot
 from casysid.signals import Motion
+from casysid.uncertainty import ParameterUncertainty
 
 JOINT_KINDS = ("viscous", "coulomb", "offset", "armature")
 
@@ -35,6 +36,7 @@ class IdentificationResult:
         regressor: Of which ``parameters`` are the coefficients.
         estimate: The unconstrained estimate.
         projection: How the estimate was made consistent; None when that was not asked for.
+        uncertainty: Standard errors of the answer.
         structural: Base parameters of the mechanism.
         excited: Base parameters that the recordings show.
         unconstrained: Torque error of the estimate before the projection, on the held-out recordings if there are any.
@@ -53,6 +55,7 @@ class IdentificationResult:
     regressor: Regressor
     estimate: Estimate
     projection: ProjectionResult | None
+    uncertainty: ParameterUncertainty
     structural: BaseParameters
     excited: BaseParameters
     unconstrained: TorqueError
@@ -111,7 +114,7 @@ class IdentificationResult:
             link_properties(
                 link,
                 self.parameters[10 * k : 10 * k + 10],
-                self.estimate.covariance[10 * k : 10 * k + 10, 10 * k : 10 * k + 10],
+                self.uncertainty.link_std[k],
                 identifiable[10 * k : 10 * k + 10],
             )
             for k, link in enumerate(self.robot.links)
@@ -119,9 +122,16 @@ class IdentificationResult:
 
     def drive_parameters(self) -> dict[str, dict[str, float | None]]:
         """Friction and armature by degree of freedom, couplings by name; None for a kind that is not in the model."""
+        return self._by_drive(self.parameters)
+
+    def drive_std(self) -> dict[str, dict[str, float | None]]:
+        """Standard errors of the same; infinite where the data do not tell a parameter by itself."""
+        return self._by_drive(self.uncertainty.std)
+
+    def _by_drive(self, values: Array) -> dict[str, dict[str, float | None]]:
         table: dict[str, dict[str, float | None]] = {dof: dict.fromkeys(JOINT_KINDS) for dof in self.robot.dofs}
         inertial = 10 * len(self.robot.links)
-        for parameter, value in zip(self.regressor.parameters[inertial:], self.parameters[inertial:], strict=True):
+        for parameter, value in zip(self.regressor.parameters[inertial:], values[inertial:], strict=True):
             table.setdefault(parameter.owner, {})[parameter.kind] = float(value)
         return table
 
@@ -172,6 +182,8 @@ class IdentificationResult:
             },
             "links": {link.name: link.to_json() for link in self.links()},
             "friction": self.drive_parameters(),
+            "friction_std": self.drive_std(),
+            "degrees_of_freedom": self.uncertainty.freedom,
             "diagnostics": dict(self.estimate.diagnostics),
         }
         return content
