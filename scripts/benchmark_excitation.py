@@ -11,6 +11,7 @@ time. ``safety``: violations on a grid finer than ten times that of the design, 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import time
 import warnings
@@ -25,7 +26,7 @@ from casysid.errors import CasysidError, CasysidWarning
 from casysid.excitation import ConditionNumber, FourierSeries, build_excitation, design_excitation
 from casysid.excitation.feasible import TIGHTENING, find_standing, random_start, small_start
 from casysid.excitation.program import Evaluation
-from casysid.excitation.search import STRIDE
+from casysid.excitation.search import STRIDE, shrunk
 from casysid.robot import Robot
 
 SERIES = FourierSeries(10.0, 5)
@@ -109,40 +110,45 @@ def random_best(problem):
 
 
 def slsqp(problem, seconds):
-    """SLSQP by finite differences on the same variables, objective and constraints, until the time is over."""
+    """SLSQP by finite differences on the same variables and constraints, from new starts until the time is over.
+
+    Where it ends beyond the limits, its motion is made smaller as ours would be.
+    """
     evaluation = Evaluation(problem, problem.blocks, STRIDE)
+    standing, rng = find_standing(problem, 0), np.random.default_rng(0)
     lower, upper = evaluation.bounds(TIGHTENING)
     finite = np.isfinite(lower), np.isfinite(upper)
-    began, best = time.process_time(), {"objective": np.inf, "x": None, "iterations": 0}
+    began, best, ends = time.process_time(), (-np.inf, None), 0
 
     def room(x):
         values = evaluation.constraints(x)
         return np.concatenate([(values - lower)[finite[0]], (upper - values)[finite[1]]])
 
     def watch(x):
-        best["iterations"] += 1
-        value = evaluation.objective(x)
-        if value < best["objective"] and room(x).min() >= -1e-6:
-            best.update(objective=value, x=x.copy())
+        latest[:] = [x.copy()]
         if time.process_time() - began > seconds:
             raise StopIteration
 
-    start = small_start(problem, find_standing(problem, 0), 0)
-    try:
-        minimize(
-            evaluation.objective,
-            start,
-            method="SLSQP",
-            callback=watch,
-            options={"maxiter": 1000, "ftol": 1e-6},
-            constraints={"type": "ineq", "fun": room},
-        )
-    except StopIteration:
-        pass
-    answer = {"cpu": time.process_time() - began, "iterations": best["iterations"]}
-    if best["x"] is None:
-        return {**answer, "log_det": -np.inf, "condition": np.inf}
-    return {**answer, **quality(problem, problem.trajectory(best["x"]))}
+    x = small_start(problem, standing, 0)
+    while time.process_time() - began < seconds:
+        latest = [x]
+        with contextlib.suppress(StopIteration):
+            answer = minimize(
+                evaluation.objective,
+                x,
+                method="SLSQP",
+                callback=watch,
+                options={"maxiter": 1000, "ftol": 1e-6},
+                constraints={"type": "ineq", "fun": room},
+            )
+            latest, ends = [answer.x], ends + 1
+        smaller = shrunk(problem, latest[0])
+        if smaller is not None:
+            one = quality(problem, problem.trajectory(smaller[0]))
+            best = max(best, (one["log_det"], one["condition"]), key=lambda pair: pair[0])
+        drawn = random_start(problem, evaluation, standing, rng)
+        x = x if drawn is None else drawn
+    return {"cpu": time.process_time() - began, "finished_runs": ends, "log_det": best[0], "condition": best[1]}
 
 
 def run_rivals(robots, budget):

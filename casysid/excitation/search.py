@@ -5,18 +5,19 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from casysid.arrays import Array
 from casysid.excitation.blocks import Block, TorqueBlock
+from casysid.excitation.criteria import DOptimal
 from casysid.excitation.feasible import TIGHTENING, Standing, find_standing, random_start, small_start
 from casysid.excitation.problem import ExcitationProblem
 from casysid.excitation.program import Evaluation, Program
 from casysid.excitation.results import DesignStatus, DesignStep, ExcitationDesign, Progress, StartReport
-from casysid.excitation.series import ExcitationTrajectory
 from casysid.excitation.verification import Verification, verify
-from casysid.nlp import NlpIteration, NlpSettings, solve_nlp
+from casysid.nlp import NlpIteration, NlpSettings, NlpSolution, solve_nlp
 
 DRAWS = 12
 """Random motions looked at for each start; the best become starts."""
@@ -32,6 +33,14 @@ FEASIBLE = 1e-6
 """Largest violation, as a share of the limits and beyond the tightening, of what counts as keeping them."""
 SHRINKING = 1.2
 """A motion beyond its limits is made smaller by so many times the share by which it is, until it passes the check."""
+
+
+class Found(NamedTuple):
+    """A motion that keeps the limits of some grid."""
+
+    objective: float
+    variables: Array
+    converged: bool
 
 
 class Search:
@@ -50,65 +59,78 @@ class Search:
         self.progress, self.began, self.stopped = progress, time.perf_counter(), False
         self.reports: list[StartReport] = []
         self.evaluations: list[Evaluation] = []
-        self.found: list[tuple[float, Array]] = []  # the best of each start that keeps the limits of its grid
+        self.found: list[Found] = []
 
     def run(self) -> ExcitationDesign:
         """Search, then make sure of the limits."""
         standing = find_standing(self.problem, self.seed)
         safe = small_start(self.problem, standing, self.seed)
-        every = self._evaluation(self.problem.blocks)
-        self.found.append((every.objective(safe), safe))
+        every = self._evaluation(self.problem, self.problem.blocks)
+        self.found.append(Found(every.objective(safe), safe, False))
         try:
-            finished = self._search(standing, safe, every)
-            status = DesignStatus.CONVERGED if finished else DesignStatus.UNFINISHED
+            self._search(standing, safe, every)
         except KeyboardInterrupt:
-            status = DesignStatus.INTERRUPTED
-        if self.stopped:
-            status = DesignStatus.INTERRUPTED
-        trajectory, shrink = self._best_within_limits(every)
+            self.stopped = True
+        best, shrink = self._best_within_limits(every)
+        finished = DesignStatus.CONVERGED if best.converged and not self._over() else DesignStatus.UNFINISHED
         return ExcitationDesign(
             problem=self.problem,
-            trajectory=trajectory,
-            status=status,
+            trajectory=self.problem.trajectory(best.variables),
+            status=DesignStatus.INTERRUPTED if self.stopped else finished,
             starts=tuple(self.reports),
             evaluations={name: sum(one.counts[name] for one in self.evaluations) for name in every.counts},
             seconds=time.perf_counter() - self.began,
             shrink=shrink,
         )
 
-    def _search(self, standing: Standing, safe: Array, every: Evaluation) -> bool:
-        """Every start, then the best again where it goes beyond limits between instants; whether that converged."""
+    def _search(self, standing: Standing, safe: Array, every: Evaluation) -> None:
+        """Every start, then the best again where it goes beyond limits between instants."""
         drawn = self._draw(standing, every) if self.starts > 1 else []
         blocks = self._watched([safe, *drawn])
-        program = Program(self._evaluation(blocks, STRIDE), self.settings)
-        converged = [self._solve(program, k + 1, x) for k, x in enumerate([safe, *drawn[: self.starts - 1]])]
-        finished = any(converged)
+        program = Program(self._evaluation(self.problem, blocks, STRIDE), self.settings)
+        for k, x in enumerate([self._prepared(safe, blocks), *drawn[: self.starts - 1]]):
+            self._solve(program, k + 1, x)
         extra = np.empty(0)
         for _ in range(REPAIRS):
-            best = min(self.found, key=lambda one: one[0])
-            smaller = _shrunk(self.problem, best[1], NEARLY)
-            if self._over() or smaller is not None:
+            best = min(self.found, key=lambda one: one.objective)
+            if self._over() or shrunk(self.problem, best.variables, NEARLY) is not None:
                 break
-            checked = verify(self.problem, self.problem.trajectory(best[1]))
+            checked = verify(self.problem, self.problem.trajectory(best.variables))
             extra = np.append(extra, _instants(self.problem, checked))
             self.found = [one for one in self.found if one is not best]
-            self._keep_smaller(best[1], every)
-            evaluation = self._evaluation(self._watched([safe, *drawn], checked), 1, extra)
-            self._solve(Program(evaluation, self._repairing), self.starts + 1, best[1])
-        return finished and not self._over()
+            self._keep_smaller(best, every)
+            evaluation = self._evaluation(self.problem, self._watched([safe, *drawn], checked), 1, extra)
+            self._solve(Program(evaluation, self._repairing), self.starts + 1, best.variables)
+
+    def _prepared(self, x: Array, blocks: Sequence[Block]) -> Array:
+        """The safe motion; for criteria that are hard to climb from there, first the D-optimal motion near it."""
+        if isinstance(self.problem.criterion, DOptimal):
+            return x
+        easier = self.problem.judged_by(DOptimal())
+        program = Program(self._evaluation(easier, blocks, STRIDE), self._preparing)
+        best, solution = self._run(program, 1, x)
+        if solution is None:
+            raise KeyboardInterrupt
+        return best.variables
+
+    @property
+    def _preparing(self) -> NlpSettings:
+        return dataclasses.replace(self.settings, max_iterations=min(self.settings.max_iterations, 60))
 
     @property
     def _repairing(self) -> NlpSettings:
-        return dataclasses.replace(self.settings, barrier=1e-3, max_iterations=min(self.settings.max_iterations, 60))
+        return dataclasses.replace(self._preparing, barrier=1e-3)
 
-    def _keep_smaller(self, x: Array, every: Evaluation) -> None:
+    def _keep_smaller(self, one: Found, every: Evaluation) -> None:
         """Remember the motion made smaller until it passes, in case nothing better comes."""
-        smaller = _shrunk(self.problem, x)
+        smaller = shrunk(self.problem, one.variables)
         if smaller is not None:
-            self.found.append((every.objective(smaller[0]), smaller[0]))
+            self.found.append(Found(every.objective(smaller[0]), smaller[0], one.converged))
 
-    def _evaluation(self, blocks: Sequence[Block], stride: int = 1, extra: Array | None = None) -> Evaluation:
-        self.evaluations.append(Evaluation(self.problem, blocks, stride, extra))
+    def _evaluation(
+        self, problem: ExcitationProblem, blocks: Sequence[Block], stride: int = 1, extra: Array | None = None
+    ) -> Evaluation:
+        self.evaluations.append(Evaluation(problem, blocks, stride, extra))
         return self.evaluations[-1]
 
     def _draw(self, standing: Standing, every: Evaluation) -> list[Array]:
@@ -117,7 +139,7 @@ class Search:
         drawn = [random_start(self.problem, every, standing, rng) for _ in range(DRAWS * (self.starts - 1))]
         feasible = [x for x in drawn if x is not None]
         values = [every.objective(x) for x in feasible]
-        self.found += [(values[k], feasible[k]) for k in np.argsort(values)[:1]]
+        self.found += [Found(values[k], feasible[k], False) for k in np.argsort(values)[:1]]
         return [feasible[k] for k in np.argsort(values)]
 
     def _watched(self, motions: list[Array], checked: Verification | None = None) -> list[Block]:
@@ -134,47 +156,53 @@ class Search:
                 blocks.append(block)
         return [block for block in blocks if block is not None]
 
-    def _solve(self, program: Program, number: int, x: Array) -> bool:
-        """Whether IPOPT converged; the best motion on its way that keeps the limits is remembered."""
+    def _solve(self, program: Program, number: int, x: Array) -> None:
+        """Run, and remember the best motion on the way and a report."""
         if self._over():
-            return False
-        best: tuple[float, Array] = np.inf, x
-
-        def tell(iteration: NlpIteration) -> bool:
-            nonlocal best
-            if iteration.infeasibility <= FEASIBLE and iteration.objective < best[0]:
-                best = iteration.objective, iteration.variables
-            self.stopped = self.stopped or self._tell(number, iteration, best[0])
-            return self._over()
-
-        start_lower, start_upper = _bounds(self.problem)
-        lower, upper = program.evaluation.bounds(TIGHTENING)
+            return
         first = program.evaluation.objective(x)
-        try:
-            solution = solve_nlp(
-                program.nlp,
-                x,
-                lower=start_lower,
-                upper=start_upper,
-                constraint_lower=lower,
-                constraint_upper=upper,
-                progress=tell,
-            )
-            if solution.infeasibility <= FEASIBLE and solution.objective < best[0]:
-                best = solution.objective, solution.variables
-        finally:
-            if np.isfinite(best[0]):
-                self.found.append(best)
+        best, solution = self._run(program, number, x)
+        if np.isfinite(best.objective):
+            self.found.append(best)
+        if solution is None:
+            raise KeyboardInterrupt
         self.reports.append(
             StartReport(
                 status=solution.status,
                 first=first,
-                objective=best[0],
+                objective=best.objective,
                 iterations=solution.iterations,
                 seconds=solution.seconds,
             )
         )
-        return solution.success
+
+    def _run(self, program: Program, number: int, x: Array) -> tuple[Found, NlpSolution | None]:
+        """The optimum, or else the best motion on the way that keeps the limits of the grid; None after Ctrl-C."""
+        best = Found(np.inf, x, False)
+
+        def tell(iteration: NlpIteration) -> bool:
+            nonlocal best
+            if iteration.infeasibility <= FEASIBLE and iteration.objective < best.objective:
+                best = Found(iteration.objective, iteration.variables, False)
+            self.stopped = self.stopped or self._tell(number, iteration, best.objective)
+            return self._over()
+
+        sides, limits = _bounds(self.problem), program.evaluation.bounds(TIGHTENING)
+        try:
+            solution = solve_nlp(
+                program.nlp,
+                x,
+                lower=sides[0],
+                upper=sides[1],
+                constraint_lower=limits[0],
+                constraint_upper=limits[1],
+                progress=tell,
+            )
+        except KeyboardInterrupt:
+            return best, None
+        if solution.success and solution.infeasibility <= FEASIBLE:
+            best = Found(solution.objective, solution.variables, True)
+        return best, solution
 
     def _over(self) -> bool:
         return self.stopped or time.perf_counter() - self.began > self.settings.max_seconds
@@ -188,24 +216,24 @@ class Search:
             step=iteration.step,
             objective=iteration.objective,
             infeasibility=iteration.infeasibility,
-            best=min(best, *(objective for objective, _ in self.found)),
+            best=min(best, *(one.objective for one in self.found)),
             seconds=time.perf_counter() - self.began,
         )
         return bool(self.progress(step))
 
-    def _best_within_limits(self, every: Evaluation) -> tuple[ExcitationTrajectory, float]:
+    def _best_within_limits(self, every: Evaluation) -> tuple[Found, float]:
         """Of all that was found, made smaller where needed, the best that passes the check; in the end the safe one."""
-        best: tuple[float, Array, float] = np.inf, self.found[0][1], 0.0
-        for objective, x in sorted(self.found, key=lambda one: one[0]):
-            if objective >= best[0]:
+        best, shrink = Found(np.inf, self.found[0].variables, False), 0.0
+        for one in sorted(self.found, key=lambda one: one.objective):
+            if one.objective >= best.objective:
                 break
-            smaller = _shrunk(self.problem, x)
-            if smaller is not None and (value := every.objective(smaller[0])) < best[0]:
-                best = value, *smaller
-        return self.problem.trajectory(best[1]), best[2]
+            smaller = shrunk(self.problem, one.variables)
+            if smaller is not None and (value := every.objective(smaller[0])) < best.objective:
+                best, shrink = Found(value, smaller[0], one.converged), smaller[1]
+        return best, shrink
 
 
-def _shrunk(problem: ExcitationProblem, x: Array, least: float = 0.5) -> tuple[Array, float] | None:
+def shrunk(problem: ExcitationProblem, x: Array, least: float = 0.5) -> tuple[Array, float] | None:
     """The motion, made smaller about its middle until it passes the check, and the factor; None if it never does."""
     n = len(problem.robot.dofs)
     values = x.reshape(n, -1)
