@@ -77,18 +77,23 @@ class Ascent:
 
 
 def ascend(
-    evaluate: Callable[[Array], Point], start: Array, lowest: Array, *, tolerance: float, max_iterations: int
+    evaluate: Callable[[Array], Point],
+    start: Array,
+    limits: tuple[Array, Array],
+    *,
+    tolerance: float,
+    max_iterations: int,
 ) -> Ascent:
     """Climb until the bound's relative gain over a cycle of iterations is below ``tolerance``.
 
     Args:
         evaluate: The bound and its surroundings at a vector.
         start: First vector.
-        lowest: Lower limits of the vector's entries.
+        limits: Lowest and highest admissible vector.
         tolerance: Relative gain of the bound over a cycle.
         max_iterations: Iterations at most.
     """
-    climber = _Climber(evaluate, evaluate(start), lowest)
+    climber = _Climber(evaluate, evaluate(start), limits)
     while len(climber.bounds) <= max_iterations:
         stepped = len(climber.bounds) > WARM_UP and (climber.quasi_newton_step() or climber.quasi_newton_step())
         if not stepped and not climber.em_step():
@@ -102,9 +107,9 @@ def ascend(
 class _Climber:
     """The state of one climb."""
 
-    def __init__(self, evaluate: Callable[[Array], Point], point: Point, lowest: Array) -> None:
+    def __init__(self, evaluate: Callable[[Array], Point], point: Point, limits: tuple[Array, Array]) -> None:
         self.bounds = [point.bound]
-        self._evaluate, self._point, self._lowest = evaluate, point, lowest
+        self._evaluate, self._point, self._limits = evaluate, point, limits
         self._evaluations, self._em_steps = 1, 0
         self._forget()
 
@@ -117,7 +122,7 @@ class _Climber:
         self._forget()
         self._em_steps += 1
         self._evaluations += 1
-        trial = self._evaluate(np.maximum(self._point.em_step(), self._lowest))
+        trial = self._evaluate(np.clip(self._point.em_step(), *self._limits))
         if trial.bound > self._point.bound:
             self._move_to(trial)
             return True
@@ -126,11 +131,12 @@ class _Climber:
     def quasi_newton_step(self) -> bool:
         """A step that raises the bound by enough; False, and nothing learnt is kept, if there is none."""
         x, direction = self._point.vector, self._direction()
-        direction[(x <= self._lowest) & (direction < 0.0)] = 0.0
+        lowest, highest = self._limits
+        direction[((x <= lowest) & (direction < 0.0)) | ((x >= highest) & (direction > 0.0))] = 0.0
         slope = float(self._point.gradient @ direction)
         for length in LENGTHS if 0.0 < slope < np.inf else ():
             with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-                trial = self._evaluate(np.maximum(x + length * direction, self._lowest))
+                trial = self._evaluate(np.clip(x + length * direction, lowest, highest))
                 self._evaluations += 1
                 enough = trial.bound >= self._point.bound + SUFFICIENT * length * slope
             if enough:

@@ -25,7 +25,7 @@ from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError
 from casysid.estimation.acceleration import Ascent, ascend
 from casysid.estimation.base import Status
-from casysid.estimation.denoising_coordinates import CoordinatePoint, lowest_vector, to_vector
+from casysid.estimation.denoising_coordinates import CoordinatePoint, limits, to_vector
 from casysid.estimation.denoising_em import DenoisingModel, GammaPrior, State
 from casysid.moments import NormalEquations
 
@@ -49,7 +49,8 @@ class Start:
     def state(self, model: DenoisingModel) -> State:
         """The first state."""
         normal = model.normal
-        coefficients: Array = np.linalg.solve(normal.xx + self.ridge * np.diag(model.energy), normal.xy)
+        penalised = normal.xx + self.ridge * np.diag(model.energy)
+        coefficients = np.asarray(np.linalg.solve(penalised, normal.xy), dtype=np.float64)
         return state_from(model, coefficients, np.full_like(coefficients, self.noise_fraction))
 
 
@@ -229,7 +230,7 @@ def climb(model: DenoisingModel, state: State, *, tolerance: float, max_iteratio
     return ascend(
         lambda vector: CoordinatePoint(model, vector),
         to_vector(model, state),
-        lowest_vector(model),
+        limits(model),
         tolerance=tolerance,
         max_iterations=max_iterations,
     )

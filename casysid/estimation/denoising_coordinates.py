@@ -31,6 +31,8 @@ from casysid.estimation.denoising_em import LOG_2PI, DenoisingModel, State
 
 LEAST_CURVATURE = 0.05
 """Of the logit of f, which is nearly flat where a column is all noise or none."""
+LARGEST_ODDS = 1e24
+"""Of f, and of 1 - f: beyond, a column is all noise, or none."""
 JITTER = 1e-10
 """Keeps the curvature of h positive definite where columns are dependent, as a fraction of the columns' energy."""
 
@@ -43,16 +45,19 @@ def to_vector(model: DenoisingModel, state: State) -> Array:
     signal = wx * wx / kappa
     v = signal + psi_x
     D = psi_y + float((psi_z + wz * wz / kappa * psi_x / v).sum())
-    parts = [wx * wz / (kappa * v), np.log(v), np.log(psi_x) - np.log(signal), np.log(psi_z), np.log([psi_y, D])]
+    odds = np.clip(psi_x / np.maximum(signal, LARGEST_ODDS**-1 * psi_x), LARGEST_ODDS**-1, LARGEST_ODDS)
+    parts = [wx * wz / (kappa * v), np.log(v), np.log(odds), np.log(psi_z), np.log([psi_y, D])]
     return np.concatenate(parts if model.prior is None else [*parts, np.log(rho_z), np.log(rho_x)])
 
 
-def lowest_vector(model: DenoisingModel) -> Array:
-    """Lower limits: of D only, which without noise would fall for ever."""
+def limits(model: DenoisingModel) -> tuple[Array, Array]:
+    """Lowest and highest vector: of D, which without noise would fall for ever, and of the odds of f."""
     d = len(model.energy)
-    lowest = np.full((4 if model.prior is None else 6) * d + 2, -np.inf)
+    highest = np.full((4 if model.prior is None else 6) * d + 2, np.inf)
+    highest[2 * d : 3 * d] = np.log(LARGEST_ODDS)
+    lowest = -highest
     lowest[4 * d + 1] = np.log((d + 1) * model.least_noise[1])
-    return lowest
+    return lowest, highest
 
 
 @dataclass(frozen=True, eq=False)
