@@ -17,7 +17,7 @@ FREE_SPEED = {True: 0.5, False: 2.0}
 """Velocity of a joint without a velocity limit: [m/s], [rad/s]."""
 WIDEST = 4.0 * np.pi
 """Limits farther away than this, [rad] or [m], are none."""
-FASTEST = 100.0
+FASTEST = 50.0
 """A velocity limit beyond this, [rad/s] or [m/s], is none."""
 
 
