@@ -38,7 +38,8 @@ from casysid.validation import hidden_truth, measure_tracking, track, true_coeff
 CUTOFF = 20.0  # [Hz], of the low-pass that all of the paper's methods share: twenty times the fastest sinusoid
 PIECES = 8  # recordings, each along sinusoids of its own
 EVALUATION = 20.0  # [s] of each trajectory that is tracked
-STANDING = 3.0  # widths of Coulomb's smooth sign, which is then within 0.5 % of one
+STANDING = 0.1  # of the joint's root mean square velocity; and no less than
+STANDING_WIDTHS = 3.0  # widths of Coulomb's smooth sign, which is then within 0.5 % of one
 FEW_ROWS = 100_000  # are as good as all once the low-pass has made neighbours alike
 HAND_TUNED = np.geomspace(1e-8, 1e1, 10)
 
@@ -217,11 +218,13 @@ def beyond(estimator: Estimator) -> Method:
 
 def moving_moments(problem: LinearProblem) -> Moments:
     """The moments of a problem, each joint's equations only from samples at which it moves."""
-    standing = STANDING * coulomb_width(problem.motions, USUAL_WIDTH)
+    standing = np.maximum(
+        STANDING_WIDTHS * coulomb_width(problem.motions, USUAL_WIDTH), coulomb_width(problem.motions, STANDING)
+    )
     stride = max(1, sum(map(len, problem.motions)) // FEW_ROWS)
     parts = []
     for motion in problem.motions:
-        few = motion.every(stride)
+        few = motion.decimated(stride)
         moving = np.abs(few.v) > standing
         gram, count = [], []
         for joint in range(few.v.shape[1]):
