@@ -32,6 +32,7 @@ from casysid.moments import Moments
 from casysid.projection import build_projection, project
 from casysid.recording import Recording
 from casysid.robot import Robot
+from casysid.signals import build_smoother, motion_from_recording
 from casysid.simulation import PD, ControlModel, Plant, PlantSettings, Sensing, SimulatedRun, design_sinusoids
 from casysid.validation import hidden_truth, measure_tracking, track, true_coefficients
 
@@ -125,7 +126,7 @@ def evaluate(experiment: Experiment, pieces: Sequence[Path]) -> Outcome:
     recordings = [_read(plant.robot, path) for path in pieces]
     settings = Settings(friction=experiment.friction, threads=1)
     problem = build_problem(plant.robot, recordings, CUTOFF, settings)
-    moments = moving_moments(problem) if experiment.moving else problem.moments
+    moments = moving_moments(problem, recordings, CUTOFF) if experiment.moving else problem.moments
     problem = dataclasses.replace(
         problem, motions=(), moments=moments
     )  # the moments are all that is needed from here on
@@ -209,31 +210,32 @@ def beyond(estimator: Estimator) -> Method:
         cutoff = choose_cutoff(plant.robot, few, settings).cutoff
         width = choose_relative_width(plant.robot, few, cutoff, settings)
         own = build_problem(plant.robot, recordings, cutoff, settings, relative_width=width)
-        moments = moving_moments(own)
+        moments = moving_moments(own, recordings, cutoff)
         estimate = estimator.estimate(moments, own.regressor.prior)
         return project_estimate(own.regressor, moments, estimate), f"cut-off {cutoff:.3g} Hz"
 
     return fit
 
 
-def moving_moments(problem: LinearProblem) -> Moments:
-    """The moments of a problem, each joint's equations only from samples at which it moves."""
-    standing = np.maximum(
-        STANDING_WIDTHS * coulomb_width(problem.motions, USUAL_WIDTH), coulomb_width(problem.motions, STANDING)
-    )
-    stride = max(1, sum(map(len, problem.motions)) // FEW_ROWS)
+def moving_moments(problem: LinearProblem, recordings: Sequence[Recording], cutoff: float | None) -> Moments:
+    """Moments of a problem's regressor, each joint's equations only from samples at which it moves."""
+    regressor = problem.regressor
+    motions = [motion_from_recording(regressor.robot, recording, cutoff) for recording in recordings]
+    standing = np.maximum(STANDING_WIDTHS * coulomb_width(motions, USUAL_WIDTH), coulomb_width(motions, STANDING))
+    stride = max(1, sum(map(len, motions)) // FEW_ROWS)
     parts = []
-    for motion in problem.motions:
-        few = motion.decimated(stride)
-        moving = np.abs(few.v) > standing
-        gram, count = [], []
-        for joint in range(few.v.shape[1]):
-            part = accumulate_moments(
-                problem.regressor, few.q, few.v, few.a, few.tau, valid=moving[:, joint], blocks=4, threads=1
-            )
-            gram.append(part.gram[:, joint])
-            count.append(part.count[:, joint])
-        parts.append(Moments(np.stack(gram, axis=1), np.stack(count, axis=1), part.columns, part.joints))
+    for motion, recording in zip(motions, recordings, strict=True):
+        torque = recording.torque
+        if cutoff is not None:
+            torque = build_smoother(motion.time, cutoff).smooth(torque)
+        q, v, a, tau = (x[::stride] for x in (motion.q, motion.v, motion.a, torque))
+        each = [
+            accumulate_moments(regressor, q, v, a, tau, valid=np.abs(v[:, k]) > standing[k], blocks=4, threads=1)
+            for k in range(v.shape[1])
+        ]
+        gram = np.stack([part.gram[:, k] for k, part in enumerate(each)], axis=1)
+        count = np.stack([part.count[:, k] for k, part in enumerate(each)], axis=1)
+        parts.append(Moments(gram, count, each[0].columns, each[0].joints))
     return functools.reduce(operator.add, parts)
 
 
