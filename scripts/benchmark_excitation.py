@@ -26,7 +26,8 @@ from casysid.errors import CasysidError, CasysidWarning
 from casysid.excitation import ConditionNumber, FourierSeries, build_excitation, design_excitation
 from casysid.excitation.feasible import TIGHTENING, find_standing, random_start, small_start
 from casysid.excitation.program import Evaluation
-from casysid.excitation.search import STRIDE, shrunk
+from casysid.excitation.repair import shrunk
+from casysid.excitation.search import STRIDE
 from casysid.robot import Robot
 
 SERIES = FourierSeries(10.0, 5)

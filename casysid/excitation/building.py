@@ -82,44 +82,53 @@ def build_excitation(
     series = series or choose_series(limits, rate)
     samples = _grid(series, rate, samples)
     _check_period(robot, series, limits, rate, periods)
-    friction = default_friction(limits) if friction is None else friction
-    regressor = build_regressor(robot, friction)
-    theta = regressor.prior if parameters is None else np.asarray(parameters, dtype=np.float64)
-    if theta.shape != regressor.prior.shape or not np.isfinite(theta).all():
-        raise ParameterError(
-            f"excitation: parameters must be {len(regressor.names)} finite numbers, {regressor.names[0]} ... "
-            f"{regressor.names[-1]}; got shape {theta.shape}"
-        )
+    regressor = build_regressor(robot, default_friction(limits) if friction is None else friction)
+    theta = _parameters(regressor, parameters)
     states = random_states(limits, series, np.random.default_rng(0), STATES)
-    noise = _noise(robot, regressor, theta, states, torque_noise)
-    base = structural_base_parameters(regressor)
-    scale = column_scale(regressor, base, noise, states)
-    information = Information(regressor=regressor, base=base, noise_std=noise, scale=scale)
-    cartesian, notes = _distance_blocks(robot, limits, states, capsules, obstacles, clearance)
-    joints = [
-        joint_block(robot, 0, limits.lower, limits.upper),
-        *(
-            joint_block(robot, order, -bound, bound)
-            for order, bound in enumerate((limits.velocity, limits.acceleration, limits.jerk), 1)
-        ),
-    ]
-    limited = np.flatnonzero(np.isfinite(limits.torque))
-    torque = [TorqueBlock(regressor, frozen(theta), limited, limits.torque[limited])] if len(limited) else []
+    information = _information(regressor, theta, states, torque_noise)
+    distances, notes = _distance_blocks(robot, limits, states, capsules, obstacles, clearance)
     return ExcitationProblem(
         robot=robot,
         series=series,
         periods=periods,
         rate=rate,
         limits=limits,
-        parameters=frozen(theta),
+        parameters=theta,
         information=information,
-        known=frozen(np.zeros((base.rank, base.rank))),
+        known=frozen(np.zeros((information.size, information.size))),
         criterion=criterion or DOptimal(),
-        blocks=(*(block for block in joints if block is not None), *torque, *cartesian, *keep_in),
+        blocks=(*_joint_blocks(regressor, limits, theta), *distances, *keep_in),
         samples=samples,
         start=_start(robot, limits, start),
         notes=(*limits.assumed, *notes),
     )
+
+
+def _parameters(regressor: Regressor, given: npt.ArrayLike | None) -> Array:
+    theta = frozen(regressor.prior if given is None else given)
+    if theta.shape != regressor.prior.shape or not np.isfinite(theta).all():
+        raise ParameterError(
+            f"excitation: parameters must be {len(regressor.names)} finite numbers, {regressor.names[0]} ... "
+            f"{regressor.names[-1]}; got shape {theta.shape}"
+        )
+    return theta
+
+
+def _information(regressor: Regressor, theta: Array, states: Motion, noise: npt.ArrayLike | None) -> Information:
+    noise_std = _noise(regressor.robot, regressor, theta, states, noise)
+    base = structural_base_parameters(regressor)
+    scale = column_scale(regressor, base, noise_std, states)
+    return Information(regressor=regressor, base=base, noise_std=noise_std, scale=scale)
+
+
+def _joint_blocks(regressor: Regressor, limits: JointLimits, theta: Array) -> list[Block]:
+    """Position, velocity, and where limited acceleration, jerk and torque."""
+    robot, limited = regressor.robot, np.flatnonzero(np.isfinite(limits.torque))
+    sides = [(limits.lower, limits.upper)]
+    sides += [(-bound, bound) for bound in (limits.velocity, limits.acceleration, limits.jerk)]
+    found = [joint_block(robot, order, lower, upper) for order, (lower, upper) in enumerate(sides)]
+    torque = [TorqueBlock(regressor, theta, limited, limits.torque[limited])] if len(limited) else []
+    return [*(block for block in found if block is not None), *torque]
 
 
 def default_friction(limits: JointLimits) -> tuple[FrictionColumn, ...]:

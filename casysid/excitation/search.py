@@ -15,6 +15,7 @@ from casysid.excitation.criteria import DOptimal
 from casysid.excitation.feasible import TIGHTENING, Standing, find_standing, random_start, small_start
 from casysid.excitation.problem import ExcitationProblem
 from casysid.excitation.program import Evaluation, Program
+from casysid.excitation.repair import shrunk, violated_instants
 from casysid.excitation.results import DesignStatus, DesignStep, ExcitationDesign, Progress, StartReport
 from casysid.excitation.verification import Verification, verify
 from casysid.nlp import NlpIteration, NlpSettings, NlpSolution, solve_nlp
@@ -31,8 +32,6 @@ REPAIRS = 2
 """How often the best motion is optimised again, with more instants where it went beyond limits."""
 FEASIBLE = 1e-6
 """Largest violation, as a share of the limits and beyond the tightening, of what counts as keeping them."""
-SHRINKING = 1.2
-"""A motion beyond its limits is made smaller by so many times the share by which it is, until it passes the check."""
 
 
 class Found(NamedTuple):
@@ -96,7 +95,7 @@ class Search:
             if self._over() or shrunk(self.problem, best.variables, NEARLY) is not None:
                 break
             checked = verify(self.problem, self.problem.trajectory(best.variables))
-            extra = np.append(extra, _instants(self.problem, checked))
+            extra = np.append(extra, violated_instants(self.problem, checked))
             self.found = [one for one in self.found if one is not best]
             self._keep_smaller(best, every)
             evaluation = self._evaluation(self.problem, self._watched([safe, *drawn], checked), 1, extra)
@@ -231,32 +230,6 @@ class Search:
             if smaller is not None and (value := every.objective(smaller[0])) < best.objective:
                 best, shrink = Found(value, smaller[0], one.converged), smaller[1]
         return best, shrink
-
-
-def shrunk(problem: ExcitationProblem, x: Array, least: float = 0.5) -> tuple[Array, float] | None:
-    """The motion, made smaller about its middle until it passes the check, and the factor; None if it never does."""
-    n = len(problem.robot.dofs)
-    values = x.reshape(n, -1)
-    anchor = np.zeros_like(values)
-    anchor[:, 0] = values[:, 0]
-    if problem.start is None:
-        position = problem.trajectory(x).motion(problem.series.grid(problem.samples)).position
-        anchor[:, 0] = (position.max(axis=0) + position.min(axis=0)) / 2.0 / problem.limits.half_range
-    factor = 1.0
-    while factor >= least:
-        smaller = (anchor + factor * (values - anchor)).ravel()
-        checked = verify(problem, problem.trajectory(smaller))
-        if checked.passed:
-            return smaller, factor
-        factor *= 1.0 - min(SHRINKING * -checked.violations[0].share + 5e-4, 0.2)
-    return None
-
-
-def _instants(problem: ExcitationProblem, checked: Verification) -> Array:
-    """Where limits are violated, and just before and after."""
-    step = problem.series.period / (4 * problem.samples)
-    worst = np.array([one.instant for one in checked.violations])
-    return np.unique(np.concatenate([worst - step, worst, worst + step]) % problem.series.period)
 
 
 def _bounds(problem: ExcitationProblem) -> tuple[Array, Array]:

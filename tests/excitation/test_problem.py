@@ -169,3 +169,12 @@ def test_a_link_that_does_not_exist_cannot_be_kept_in(two_link):
 def test_shares_of_limits_are_shares(two_link, share):
     with pytest.raises(ParameterError, match="torque_share"):
         limits_of(two_link, torque_share=share)
+
+
+def test_limits_that_a_model_lacks_are_assumed_and_named():
+    robot = random_robot(np.random.default_rng(1), [JointKind.CONTINUOUS, JointKind.PRISMATIC])
+    limits = limits_of(robot)
+    assert np.isfinite([limits.lower, limits.upper, limits.velocity]).all()
+    assert any("'joint_1' has no position limits" in note for note in limits.assumed)
+    assert any("'joint_2' has no velocity limit" in note for note in limits.assumed)
+    assert set(limits.assumed) <= set(build_excitation(robot, series=SERIES, capsules=[]).notes)

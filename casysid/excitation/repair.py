@@ -1,0 +1,38 @@
+"""What to do with a motion that goes a little beyond its limits: where it does, and how much smaller keeps them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from casysid.arrays import Array
+from casysid.excitation.problem import ExcitationProblem
+from casysid.excitation.verification import Verification, verify
+
+SHRINKING = 1.2
+"""A motion beyond its limits is made smaller by so many times the share by which it is, until it passes the check."""
+
+
+def shrunk(problem: ExcitationProblem, x: Array, least: float = 0.5) -> tuple[Array, float] | None:
+    """The motion, made smaller about its middle until it passes the check, and the factor; None if it never does."""
+    n = len(problem.robot.dofs)
+    values = x.reshape(n, -1)
+    anchor = np.zeros_like(values)
+    anchor[:, 0] = values[:, 0]
+    if problem.start is None:
+        position = problem.trajectory(x).motion(problem.series.grid(problem.samples)).position
+        anchor[:, 0] = (position.max(axis=0) + position.min(axis=0)) / 2.0 / problem.limits.half_range
+    factor = 1.0
+    while factor >= least:
+        smaller = (anchor + factor * (values - anchor)).ravel()
+        checked = verify(problem, problem.trajectory(smaller))
+        if checked.passed:
+            return smaller, factor
+        factor *= 1.0 - min(SHRINKING * -checked.violations[0].share + 5e-4, 0.2)
+    return None
+
+
+def violated_instants(problem: ExcitationProblem, checked: Verification) -> Array:
+    """Where limits are violated, and just before and after."""
+    step = problem.series.period / (4 * problem.samples)
+    worst = np.array([one.instant for one in checked.violations])
+    return np.unique(np.concatenate([worst - step, worst, worst + step]) % problem.series.period)
