@@ -1,10 +1,9 @@
 """Which parameters can be known at all, which this recording shows, and in what combinations.
 
 Structure: the regressor at random states has a null space however rich the motion is. Columns are taken from the base
-    to the tip;
-one that depends on those before it joins them, so that ``β = θ_independent + K θ_dependent`` are the base parameters
-(Gautier and Khalil 1990, numerical form Gautier 1991). Data: the same on the moments of a recording, where further
-directions may be too weak.
+to the tip; one that depends on those before it joins them, so that ``β = θ_independent + K θ_dependent`` are the base
+parameters (Gautier and Khalil 1990, numerical form Gautier 1991). Data: the same on the moments of a recording, where
+further directions may be too weak.
 """
 
 from __future__ import annotations
@@ -22,6 +21,8 @@ from casysid.robot.coordinates import state_from_channels
 
 RANK_TOLERANCE = 3e-5
 """Relative singular values below this are rounding of the model's angles (four digits give 1e-6), not rank."""
+QUIETEST_COLUMN = 1e-8
+"""Columns smaller than this fraction of the largest are rounding of the arithmetic."""
 COEFFICIENT_TOLERANCE = 1e-3
 """Weights in a combination below this fraction of its largest are left out of the words."""
 
@@ -84,10 +85,19 @@ class BaseParameters:
         )
 
 
-def base_parameters_of_gram(gram: Array, names: tuple[str, ...], tolerance: float = RANK_TOLERANCE) -> BaseParameters:
-    """Base parameters from any Gram matrix ``Σ x xᵀ`` of the regressor's rows, shape (p, p)."""
+def base_parameters_of_gram(
+    gram: Array, names: tuple[str, ...], tolerance: float = RANK_TOLERANCE, quietest: float = QUIETEST_COLUMN
+) -> BaseParameters:
+    """Base parameters from a Gram matrix of the regressor's rows.
+
+    Args:
+        gram: ``Σ x xᵀ``, shape (p, p).
+        names: Of the p parameters.
+        tolerance: Relative singular values below this are no rank.
+        quietest: Columns smaller than this fraction of the largest are zero.
+    """
     energy = np.diag(gram).copy()
-    live = energy > np.finfo(np.float64).eps * max(energy.max(initial=0.0), np.finfo(np.float64).tiny)
+    live = energy > quietest**2 * max(energy.max(initial=0.0), np.finfo(np.float64).tiny)
     scale = np.where(live, 1.0 / np.sqrt(np.where(live, energy, 1.0)), 0.0)
     values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
     root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T  # rows whose Gram is the standardised one
@@ -120,7 +130,7 @@ def structural_base_parameters(regressor: Regressor, *, samples: int = 0, seed: 
     count = samples or 40 + 4 * len(regressor.names)
     q, v, a = random_states(robot, count, np.random.default_rng(seed))
     rows = regressor.evaluate(q, v, a).reshape(-1, len(regressor.names))
-    return base_parameters_of_gram(rows.T @ rows, regressor.names)
+    return base_parameters_of_gram(rows.T @ rows, regressor.names, quietest=RANK_TOLERANCE)
 
 
 def excited_base_parameters(regressor: Regressor, moments: Moments, noise_std: Array) -> BaseParameters:

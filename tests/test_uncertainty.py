@@ -1,4 +1,4 @@
-"""Standard errors: honest under coloured residuals, infinite where nothing is seen, carried to what engineers ask for."""
+"""Standard errors: honest under coloured residuals, infinite where nothing is seen, carried to what matters."""
 
 import dataclasses
 
