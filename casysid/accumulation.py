@@ -16,6 +16,7 @@ from casysid.arrays import Array
 from casysid.dynamics.regressor import Regressor
 from casysid.errors import ParameterError
 from casysid.moments import Moments
+from casysid.signals.averaging import BandAverage
 
 
 def accumulate_moments(
@@ -25,6 +26,7 @@ def accumulate_moments(
     a: npt.ArrayLike,
     tau: npt.ArrayLike,
     *,
+    average: BandAverage | None = None,
     valid: npt.ArrayLike | None = None,
     blocks: int = 20,
     threads: int = 2,
@@ -38,6 +40,7 @@ def accumulate_moments(
         v: Velocities, shape (N, nv).
         a: Accelerations, shape (N, nv).
         tau: Torques ``y``, shape (N, nv).
+        average: Takes averages of the equations instead of the equations themselves, of ``x`` and ``y`` alike.
         valid: Which samples to use, boolean, shape (N,); None uses all.
         blocks: How many blocks of near-equal length; fewer when there are fewer samples.
         threads: How many threads to use. The sums do not depend on it.
@@ -57,21 +60,24 @@ def accumulate_moments(
     widths = [len(columns) + 1 for columns in regressor.row_columns]
     rows, squares = np.cumsum([0, *widths]), np.cumsum([0, *(width**2 for width in widths)])
 
-    def square(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, Array]:
+    def square(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, int, Array]:
         packed = np.empty(squares[-1])
+        if average is not None:
+            values = np.ascontiguousarray((average.weights(piece) @ values.T).T)
         for joint, width in enumerate(widths):
             x = values[rows[joint] : rows[joint + 1]]
             np.matmul(x, x.T, out=packed[squares[joint] : squares[joint + 1]].reshape(width, width))
-        return len(piece), packed
+        return len(piece), values.shape[1], packed
 
-    sums, done = np.zeros((len(groups), squares[-1])), 0
+    sums, counts, done = np.zeros((len(groups), squares[-1])), np.zeros(len(groups)), 0
     with threadpool_limits(1, user_api="blas"):  # threads of ours beside threads of BLAS would wait for each other
-        for block, (count, packed) in regressor.equations.map(square, inputs, groups, threads):
+        for block, (count, equations, packed) in regressor.equations.map(square, inputs, groups, threads):
             sums[block] += packed
+            counts[block] += equations
             done += count
             if progress is not None:
                 progress(done, len(chosen))
-    return _spread(regressor, sums, squares, np.array([len(group) for group in groups], dtype=np.float64))
+    return _spread(regressor, sums, squares, counts)
 
 
 def _spread(regressor: Regressor, sums: Array, squares: npt.NDArray[np.intp], counts: Array) -> Moments:

@@ -49,12 +49,14 @@ class Moments:
         count: Rows in each sum, shape (blocks, joints).
         columns: Names of the p regressor columns.
         joints: Names of the degrees of freedom whose torque rows were summed.
+        noise: What errors of the measured motion have added to ``gram``, same shape; None when that is not known.
     """
 
     gram: Array
     count: Array
     columns: tuple[str, ...]
     joints: tuple[str, ...]
+    noise: Array | None = None
 
     def __post_init__(self) -> None:
         gram, count = np.asarray(self.gram, dtype=np.float64), np.asarray(self.count, dtype=np.float64)
@@ -70,6 +72,10 @@ class Moments:
             raise ParameterError("moments: sums must be finite; check the samples for NaN, infinities and overflow")
         object.__setattr__(self, "gram", frozen(gram))
         object.__setattr__(self, "count", frozen(count))
+        if self.noise is not None:
+            if self.noise.shape != gram.shape:
+                raise ParameterError(f"moments: noise must have shape {gram.shape}, like gram; got {self.noise.shape}")
+            object.__setattr__(self, "noise", frozen(self.noise))
 
     @classmethod
     def from_rows(
@@ -93,11 +99,13 @@ class Moments:
         """The blocks of both, one after the other; every pooled sum is the sum of the two."""
         if (self.columns, self.joints) != (other.columns, other.joints):
             raise ParameterError("moments: only moments with the same columns and joints can be added")
+        known = self.noise is not None and other.noise is not None
         return Moments(
             np.concatenate([self.gram, other.gram]),
             np.concatenate([self.count, other.count]),
             self.columns,
             self.joints,
+            np.concatenate([self.noise, other.noise]) if known else None,
         )
 
     @property
@@ -108,15 +116,19 @@ class Moments:
     def select_blocks(self, blocks: npt.ArrayLike) -> Moments:
         """The given blocks only (indices or a boolean mask)."""
         chosen = np.asarray(blocks)
-        return Moments(self.gram[chosen], self.count[chosen], self.columns, self.joints)
+        noise = None if self.noise is None else self.noise[chosen]
+        return Moments(self.gram[chosen], self.count[chosen], self.columns, self.joints, noise)
 
     def shifted(self, parameters: Array) -> Moments:
-        """The moments of ``[x, y - xᵀ θ0]``: what is left to explain beside ``parameters`` θ0, shape (p,)."""
-        gram = self.gram.copy()
-        reduced = gram[..., :-1, -1] - gram[..., :-1, :-1] @ parameters  # x (y - xᵀθ0)
-        gram[..., -1, -1] = np.maximum(gram[..., -1, -1] - (gram[..., -1, :-1] + reduced) @ parameters, 0.0)
-        gram[..., :-1, -1] = gram[..., -1, :-1] = reduced
-        return Moments(gram, self.count, self.columns, self.joints)
+        """The moments of ``[x, y - xᵀθ0]``: what is left to explain beside ``parameters`` θ0, shape (p,)."""
+        noise = None if self.noise is None else _shift(self.noise, parameters)
+        return Moments(_shift(self.gram, parameters), self.count, self.columns, self.joints, noise)
+
+    def denoised(self, share: float = 1.0) -> Moments:
+        """The moments less ``share`` of what noise has added, perhaps indefinite; unchanged when that is not known."""
+        if self.noise is None:
+            return self
+        return Moments(self.gram - share * self.noise, self.count, self.columns, self.joints)
 
     def pooled(self, weights: npt.ArrayLike | None = None) -> NormalEquations:
         """Sum over blocks and joints, each joint's rows weighted by ``1/σ²`` (shape (joints,), default 1)."""
@@ -134,3 +146,12 @@ class Moments:
     def target_energy(self) -> Array:
         """``Σ y²`` by block and joint, shape (blocks, joints)."""
         return np.asarray(self.gram[:, :, -1, -1])
+
+
+def _shift(gram: Array, parameters: Array) -> Array:
+    """``Tᵀ G T`` for the change of variables ``y → y - xᵀθ0``."""
+    shifted = gram.copy()
+    reduced = gram[..., :-1, -1] - gram[..., :-1, :-1] @ parameters
+    shifted[..., -1, -1] = gram[..., -1, -1] - (gram[..., -1, :-1] + reduced) @ parameters
+    shifted[..., :-1, -1] = shifted[..., -1, :-1] = reduced
+    return shifted

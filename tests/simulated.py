@@ -8,9 +8,9 @@ from casysid.bundled import find_model
 from casysid.robot import Robot
 from casysid.simulation import (
     IDEAL,
+    PD,
     ComputedTorque,
     ControlModel,
-    PD,
     Plant,
     PlantSettings,
     SimulatedRun,

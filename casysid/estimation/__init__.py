@@ -3,6 +3,7 @@
 from casysid.errors import ParameterError
 from casysid.estimation.base import Estimate, Estimator, Status
 from casysid.estimation.cross_validation import cross_validated_energy
+from casysid.estimation.errors_in_variables import ErrorsInVariables
 from casysid.estimation.lasso import LassoRegression
 from casysid.estimation.least_squares import OrdinaryLeastSquares, WeightedLeastSquares
 from casysid.estimation.partial_least_squares import PartialLeastSquares
@@ -15,6 +16,7 @@ ESTIMATORS: tuple[type[Estimator], ...] = (
     OrdinaryLeastSquares,
     WeightedLeastSquares,
     Ridge,
+    ErrorsInVariables,
     LassoRegression,
     StepwiseRegression,
     PartialLeastSquares,
@@ -34,6 +36,7 @@ def estimator_by_name(name: str) -> Estimator:
 
 __all__ = [
     "ESTIMATORS",
+    "ErrorsInVariables",
     "Estimate",
     "Estimator",
     "LassoRegression",

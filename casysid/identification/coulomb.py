@@ -15,7 +15,6 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.dynamics import Coulomb
 from casysid.estimation import Ridge, cross_validated_energy
-from casysid.identification.cutoff import CANDIDATE_ROWS
 from casysid.identification.problem import USUAL_WIDTH, build_problem
 from casysid.identification.settings import Settings
 from casysid.recording import Recording
@@ -39,10 +38,8 @@ def choose_relative_width(
         return np.full(robot.nv, USUAL_WIDTH)
     energy = []
     for k, width in enumerate(RELATIVE_WIDTHS):
-        problem = build_problem(
-            robot, recordings, cutoff, settings, relative_width=width, rows=max(CANDIDATE_ROWS // len(recordings), 500)
-        )
-        energy.append(cross_validated_energy(Ridge(), problem.moments, problem.regressor.prior))
+        problem = build_problem(robot, recordings, cutoff, settings, relative_width=width, quick=True)
+        energy.append(cross_validated_energy(Ridge(standard_errors=False), problem.moments, problem.regressor.prior))
         progress((k + 1) / len(RELATIVE_WIDTHS))
     error = np.sqrt(energy)  # (widths, nv)
     good_enough = error <= (1.0 + WORTHWHILE_GAIN) * error.min(axis=0)

@@ -24,13 +24,12 @@ from casysid.signals import motion_band
 
 BAND_MARGIN = 3.0
 ENERGY_IN_BAND = 0.95
-HIGHEST_SHARE_OF_RATE = 0.35
+HIGHEST_SHARE_OF_RATE = 0.2
 LOWEST_PERIODS = 4.0
 COARSE_STEP = 2.0
 FINE_STEP = float(np.sqrt(2.0))
 HOPELESS, HOPELESS_IN_A_ROW = 1.25, 3
 """So many cut-offs in a row, each worse than the best by this factor, end the search upwards."""
-CANDIDATE_ROWS = 12_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +117,8 @@ def cutoff_error(
     robot: Robot, recordings: Sequence[Recording], cutoff: float, settings: Settings, relative_width: float | Array
 ) -> float:
     """Cross-validated relative torque error at one cut-off, geometric mean over joints that feel any torque."""
-    rows = max(CANDIDATE_ROWS // len(recordings), 500)
-    problem = build_problem(robot, recordings, cutoff, settings, relative_width=relative_width, rows=rows)
-    energy = cross_validated_energy(Ridge(), problem.moments, problem.regressor.prior)
+    problem = build_problem(robot, recordings, cutoff, settings, relative_width=relative_width, quick=True)
+    energy = cross_validated_energy(Ridge(standard_errors=False), problem.moments, problem.regressor.prior)
     target = problem.moments.target_energy().sum(axis=0)
     felt = target > 0
     return float(np.exp(0.5 * np.mean(np.log(np.maximum(energy[felt], 1e-300) / target[felt]))))

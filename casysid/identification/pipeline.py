@@ -15,13 +15,13 @@ from casysid.identifiability import BaseParameters, excited_base_parameters, str
 from casysid.identification.coulomb import choose_relative_width
 from casysid.identification.cutoff import COARSE_STEP, FINE_STEP, CutoffChoice, choose_cutoff
 from casysid.identification.prediction import torque_error
-from casysid.identification.problem import USUAL_WIDTH, LinearProblem, build_problem
+from casysid.identification.problem import USUAL_WIDTH, LinearProblem, build_problem, make_motion
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 from casysid.projection import ProjectionResult, build_projection, project
 from casysid.recording import Recording
 from casysid.robot import Robot
-from casysid.signals import Motion, motion_from_recording
+from casysid.signals import Motion
 from casysid.uncertainty import ParameterUncertainty, propagate
 
 Progress = Callable[[str, float], None]
@@ -97,7 +97,7 @@ def prepare(
     clock.lap("tuning")
     progress("moments", 0.0)
     problem = build_problem(robot, fitted, cutoff.cutoff, settings, relative_width=width)
-    unseen = tuple(motion_from_recording(robot, recording, cutoff.cutoff) for recording in held_out)
+    unseen = tuple(make_motion(robot, recording, cutoff.cutoff) for recording in held_out)
     structural = structural_base_parameters(problem.regressor)
     clock.lap("moments")
     progress("moments", 1.0)
@@ -116,7 +116,7 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
     clock.lap("projection")
     progress("check", 0.0)
     parameters = estimate.parameters if projection is None else projection.parameters
-    judged = preparation.held_out or problem.motions
+    judged, band = preparation.held_out or problem.motions, problem.cutoff
     result = IdentificationResult(
         robot=preparation.robot,
         settings=settings,
@@ -127,10 +127,10 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
         uncertainty=uncertainty,
         structural=preparation.structural,
         excited=excited_base_parameters(regressor, problem.moments, estimate.noise_std),
-        unconstrained=torque_error(regressor, estimate.parameters, judged),
-        train=torque_error(regressor, parameters, problem.motions),
-        held_out=torque_error(regressor, parameters, preparation.held_out) if preparation.held_out else None,
-        file=torque_error(regressor, regressor.prior, judged),
+        unconstrained=torque_error(regressor, estimate.parameters, judged, band),
+        train=torque_error(regressor, parameters, problem.motions, band),
+        held_out=torque_error(regressor, parameters, preparation.held_out, band) if preparation.held_out else None,
+        file=torque_error(regressor, regressor.prior, judged, band),
         train_motions=problem.motions,
         held_out_motions=preparation.held_out,
         seconds={**preparation.seconds, **clock.laps},

@@ -9,7 +9,7 @@ import numpy as np
 
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
-from casysid.signals import Motion
+from casysid.signals import Motion, low_passed
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,11 +18,13 @@ class TorqueError:
 
     Attributes:
         samples: Number of instants.
-        relative: ``‖τ - τ̂‖ / ‖τ‖`` over all joints, torque seen through the low-pass of the motion.
-        relative_unfiltered: The same against the torque as logged: what no low-pass has flattered.
-        rmse: Root mean square of ``τ - τ̂`` by joint, low-passed, shape (nv,), [N m].
-        relative_by_joint: ``‖τ_j - τ̂_j‖ / ‖τ_j‖``, low-passed, shape (nv,).
-        predictions: ``τ̂`` of each motion, shape (N, nv) each.
+        relative: ``‖F(τ - τ̂)‖ / ‖F τ‖`` over all joints, ``F`` the zero-phase low-pass: measured and predicted torque
+            seen in the same band.
+        relative_unfiltered: ``‖τ - τ̂‖ / ‖τ‖``, the torque as logged: what no low-pass has flattered.
+        rmse: Root mean square of ``F(τ - τ̂)`` by joint, shape (nv,), [N m].
+        relative_by_joint: ``‖F(τ_j - τ̂_j)‖ / ‖F τ_j‖``, shape (nv,).
+        measured: ``F τ`` of each motion, shape (N, nv) each.
+        predictions: ``F τ̂`` of each motion, shape (N, nv) each.
     """
 
     samples: int
@@ -30,25 +32,33 @@ class TorqueError:
     relative_unfiltered: float
     rmse: Array
     relative_by_joint: Array
+    measured: tuple[Array, ...]
     predictions: tuple[Array, ...]
 
 
-def torque_error(regressor: Regressor, parameters: Array, motions: Sequence[Motion]) -> TorqueError:
-    """Predict each motion's torque and compare."""
-    predictions = tuple(frozen(regressor.predict(parameters, motion.q, motion.v, motion.a)) for motion in motions)
-    predicted = np.concatenate(predictions)
-    tau = np.concatenate([motion.tau for motion in motions])
-    measured = np.concatenate([motion.tau_measured for motion in motions])
-    residual = np.linalg.norm(tau - predicted, axis=0)
-    size = np.linalg.norm(tau, axis=0)
+def torque_error(
+    regressor: Regressor, parameters: Array, motions: Sequence[Motion], cutoff: float | None
+) -> TorqueError:
+    """Predict each motion's torque and compare, below ``cutoff`` [Hz] and as logged."""
+    raw = [regressor.predict(parameters, motion.q, motion.v, motion.a) for motion in motions]
+    measured = tuple(frozen(_seen(motion, motion.tau, cutoff)) for motion in motions)
+    predicted = tuple(frozen(_seen(motion, tau, cutoff)) for motion, tau in zip(motions, raw, strict=True))
+    residual = np.linalg.norm(np.concatenate(measured) - np.concatenate(predicted), axis=0)
+    size = np.linalg.norm(np.concatenate(measured), axis=0)
+    logged = np.concatenate([motion.tau for motion in motions])
     return TorqueError(
-        samples=len(tau),
+        samples=len(logged),
         relative=_ratio(np.linalg.norm(residual), np.linalg.norm(size)),
-        relative_unfiltered=_ratio(np.linalg.norm(measured - predicted), np.linalg.norm(measured)),
-        rmse=frozen(residual / np.sqrt(len(tau))),
+        relative_unfiltered=_ratio(np.linalg.norm(logged - np.concatenate(raw)), np.linalg.norm(logged)),
+        rmse=frozen(residual / np.sqrt(len(logged))),
         relative_by_joint=frozen([_ratio(e, s) for e, s in zip(residual, size, strict=True)]),
-        predictions=predictions,
+        measured=measured,
+        predictions=predicted,
     )
+
+
+def _seen(motion: Motion, tau: Array, cutoff: float | None) -> Array:
+    return tau if cutoff is None else low_passed(motion.time, tau, cutoff)
 
 
 def _ratio(error: float | np.floating, size: float | np.floating) -> float:

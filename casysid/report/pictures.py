@@ -35,17 +35,18 @@ def torque_figure(result: IdentificationResult) -> Any:
     """Measured and predicted torque of each joint over the first held-out motion, or the first fitted one."""
     error = result.held_out or result.train
     motion: Motion = (result.held_out_motions or result.train_motions)[0]
-    predicted = error.predictions[0]
+    measured, predicted = error.measured[0], error.predictions[0]
     pick = slice(None, None, max(1, len(motion) // MOST_POINTS))
     canvas, axes = figure(9.5, 1.0 + 1.35 * len(result.robot.dofs), len(result.robot.dofs))
     for k, (ax, dof) in enumerate(zip(axes, result.robot.dofs, strict=True)):
-        ax.plot(motion.time[pick], motion.tau[pick, k], color=MEASURED, linewidth=2.4, label="measured, low-passed")
+        ax.plot(motion.time[pick], measured[pick, k], color=MEASURED, linewidth=2.4, label="measured, low-passed")
         ax.plot(motion.time[pick], predicted[pick, k], color=PREDICTED, linewidth=1.0, label="predicted")
-        ax.plot(motion.time[pick], (motion.tau - predicted)[pick, k], color=RESIDUAL, linewidth=0.7, label="difference")
-        _limit(ax, motion.tau[:, k], predicted[:, k])
+        ax.plot(motion.time[pick], (measured - predicted)[pick, k], color=RESIDUAL, linewidth=0.7, label="difference")
+        _limit(ax, measured[:, k], predicted[:, k])
         ax.set_ylabel(f"{dof}\n{torque_unit(result, k)}", fontsize=8)
     axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=3, frameon=False, fontsize=8)
     axes[-1].set_xlabel("time [s]")
+    canvas.align_ylabels(axes)
     return canvas
 
 

@@ -1,7 +1,8 @@
-"""Motion: smoothed ``q, v, a`` with the torque seen through the same filter, ready for the regressor."""
+"""Motion: smoothed ``q, v, a`` and the torque beside them, ready for the regressor."""
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,21 +16,22 @@ from casysid.signals.noise import position_noise
 from casysid.signals.smoothing import build_smoother
 
 MINIMUM_SAMPLES = 8
+LONGEST_RESPONSE = 4096
+GAP_IN_STEPS = 5.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
-    """Samples of one or more recordings as the regressor wants them.
+    """Samples of a recording as the regressor wants them.
 
     Attributes:
         time: [s], shape (N,); sample numbers when the recording has no time.
         q: Configuration, shape (N, nq).
         v: Velocity, shape (N, nv).
         a: Acceleration, shape (N, nv).
-        tau: Torque through the same low-pass as the motion, shape (N, nv).
-        tau_measured: Torque as logged, shape (N, nv).
-        velocity_noise: Standard deviation of the noise left in ``v``, shape (nv,); zeros when it cannot be known.
-        cutoff: Cut-off of the low-pass [Hz]; inf when nothing was filtered.
+        tau: Torque as logged, shape (N, nv).
+        velocity_noise: Standard deviation of the noise left in ``v``, shape (nv,); zeros where it cannot be known.
+        cutoff: Of the low-pass that the positions went through [Hz]; inf when nothing was filtered.
     """
 
     time: Array
@@ -37,25 +39,29 @@ class Motion:
     v: Array
     a: Array
     tau: Array
-    tau_measured: Array
     velocity_noise: Array
     cutoff: float
 
     def __post_init__(self) -> None:
-        for name in ("time", "q", "v", "a", "tau", "tau_measured", "velocity_noise"):
+        for name in ("time", "q", "v", "a", "tau", "velocity_noise"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def __len__(self) -> int:
         return len(self.time)
 
-    def every(self, stride: int) -> Motion:
-        """Every ``stride``-th sample; the low-pass has already made the others nearly redundant."""
-        picked = {name: getattr(self, name)[::stride] for name in ("time", "q", "v", "a", "tau", "tau_measured")}
-        return Motion(**picked, velocity_noise=self.velocity_noise, cutoff=self.cutoff)
+    def decimated(self, stride: int) -> Motion:
+        """Torque averaged over ``stride`` samples, the motion at their middle: for rates far above the low-pass."""
+        if stride <= 1:
+            return self
+        whole = len(self) // stride * stride
+        middle = slice(stride // 2, whole, stride)
+        picked = {name: getattr(self, name)[middle] for name in ("time", "q", "v", "a")}
+        tau = self.tau[:whole].reshape(-1, stride, self.tau.shape[1]).mean(axis=1)
+        return Motion(**picked, tau=tau, velocity_noise=self.velocity_noise, cutoff=self.cutoff)
 
 
 def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | None) -> Motion:
-    """The recording smoothed at ``cutoff`` [Hz] and differentiated; each stretch between gaps by itself.
+    """The recording's positions smoothed at ``cutoff`` [Hz] and differentiated; each stretch between gaps by itself.
 
     Unordered samples (no time), and timed ones with ``cutoff`` None that carry velocity and acceleration, are taken as
     logged. Logged velocities are otherwise not used: the spline's derivatives of the position are consistent with it.
@@ -64,7 +70,7 @@ def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | No
         return _as_logged(robot, recording)
     pieces = [piece for piece in recording.segments if piece.stop - piece.start >= MINIMUM_SAMPLES]
     smoothed = [_smooth_piece(robot, recording, piece, cutoff) for piece in pieces]
-    q, v, a, tau = (np.concatenate([piece[k] for piece in smoothed]) for k in range(4))
+    q, v, a = (np.concatenate([piece[k] for piece in smoothed]) for k in range(3))
     rows = np.concatenate([np.arange(piece.start, piece.stop) for piece in pieces])
     longest = max(pieces, key=lambda piece: piece.stop - piece.start)
     return Motion(
@@ -72,11 +78,28 @@ def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | No
         q=q,
         v=v,
         a=a,
-        tau=tau,
-        tau_measured=recording.torque[rows],
+        tau=recording.torque[rows],
         velocity_noise=_velocity_noise(robot, recording, longest, cutoff),
         cutoff=cutoff,
     )
+
+
+def low_passed(time: Array, values: Array, cutoff: float) -> Array:
+    """Values, shape (N, n), behind the zero-phase low-pass, each stretch between gaps in time by itself."""
+    steps = np.diff(time)
+    gaps = np.flatnonzero(steps > GAP_IN_STEPS * np.median(steps)) + 1
+    pieces = np.split(np.arange(len(time)), gaps)
+    smoothed = [
+        build_smoother(time[piece], cutoff).smooth(values[piece]) if len(piece) >= MINIMUM_SAMPLES else values[piece]
+        for piece in pieces
+    ]
+    return np.concatenate(smoothed)
+
+
+def disturbed(recording: Recording, noise_std: Array, sign: float, seed: int) -> Recording:
+    """The recording with white noise added to its positions once more; ``noise_std`` by channel, shape (n,)."""
+    noise = np.random.default_rng(seed).normal(size=recording.position.shape) * noise_std
+    return dataclasses.replace(recording, position=recording.position + sign * noise)
 
 
 def _as_logged(robot: Robot, recording: Recording) -> Motion:
@@ -92,24 +115,22 @@ def _as_logged(robot: Robot, recording: Recording) -> Motion:
         v=recording.velocity,
         a=recording.acceleration,
         tau=recording.torque,
-        tau_measured=recording.torque,
         velocity_noise=np.zeros(robot.nv),
         cutoff=np.inf,
     )
 
 
-def _smooth_piece(robot: Robot, recording: Recording, piece: slice, cutoff: float) -> tuple[Array, Array, Array, Array]:
+def _smooth_piece(robot: Robot, recording: Recording, piece: slice, cutoff: float) -> tuple[Array, Array, Array]:
     assert recording.time is not None
     smoother = build_smoother(recording.time[piece], cutoff)
-    position, first, second = (smoother.smooth(recording.position[piece], derivative) for derivative in range(3))
-    return *state_from_channels(robot, position, first, second), smoother.smooth(recording.torque[piece])
+    return state_from_channels(robot, *(smoother.smooth(recording.position[piece], order) for order in range(3)))
 
 
 def _velocity_noise(robot: Robot, recording: Recording, piece: slice, cutoff: float) -> Array:
-    """Noise of the smoothed velocity of each degree of freedom, known for joints with one channel each."""
+    """Noise of the smoothed velocity of each degree of freedom, for joints with one channel each."""
     assert recording.time is not None
     time = recording.time[piece]
-    gain = np.sqrt(build_smoother(time[: min(len(time), 4096)], cutoff).noise_covariance()[1, 1])
+    gain = np.sqrt(build_smoother(time[: min(len(time), LONGEST_RESPONSE)], cutoff).noise_covariance()[1, 1])
     channel_noise = gain * position_noise(time, recording.position[piece])
     noise = np.zeros(robot.nv)
     for joint in robot.joints:

@@ -14,10 +14,9 @@ from casysid.arrays import Array
 from casysid.dynamics import Coulomb, Coupling, Regressor, build_regressor
 from casysid.errors import ParameterError
 from casysid.identification import CutoffChoice, Settings, TorqueError, choose_cutoff, torque_error
-from casysid.identification.problem import USUAL_WIDTH, coulomb_width
+from casysid.identification.problem import USUAL_WIDTH, coulomb_width, make_motion
 from casysid.recording import Recording
 from casysid.robot import Robot
-from casysid.signals import motion_from_recording
 
 Drives = Mapping[str, Mapping[str, float | None]]
 """Friction and armature by joint and kind, as in a ``result.json``."""
@@ -90,7 +89,7 @@ def validate(
     settings = Settings(cutoff=cutoff, couplings=_couplings(robot, drives or {}))
     choice = choose_cutoff(robot, recordings, settings, progress=lambda share: progress("cut-off", share))
     progress("predict", 0.0)
-    motions = [motion_from_recording(robot, recording, choice.cutoff) for recording in recordings]
+    motions = [make_motion(robot, recording, choice.cutoff) for recording in recordings]
     width = tuple(coulomb_width(motions, USUAL_WIDTH).tolist())
     friction = tuple(
         dataclasses.replace(column, width=width) if isinstance(column, Coulomb) else column
@@ -98,14 +97,14 @@ def validate(
     )
     regressor = build_regressor(robot, friction=friction, couplings=settings.couplings)
     parameters = parameters_with_drives(regressor, drives or {})
-    errors = [torque_error(regressor, parameters, [motion]) for motion in motions]
+    errors = [torque_error(regressor, parameters, [motion], choice.cutoff) for motion in motions]
     progress("predict", 1.0)
     return Validation(
         robot=robot,
         cutoff=choice,
         parameters=parameters,
         regressor=regressor,
-        total=torque_error(regressor, parameters, motions),
+        total=torque_error(regressor, parameters, motions, choice.cutoff),
         by_recording=tuple((recording.label, error) for recording, error in zip(recordings, errors, strict=True)),
     )
 

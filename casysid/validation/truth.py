@@ -73,7 +73,7 @@ def true_coefficients(plant: Plant, regressor: Regressor) -> Array:
 def compare_base_parameters(result: IdentificationResult, plant: Plant) -> BaseComparison:
     """An identification's base parameters beside those of the plant it was made on."""
     base, regressor = result.structural, result.regressor
-    moments = sum_moments(regressor, result.train_motions, result.settings)
+    moments = sum_moments(regressor, result.train_motions, result.cutoff.cutoff, result.settings)
     chosen = np.append(base.independent, len(regressor.names))
     leading = Moments(  # with β = B θ the torque is that of the leading columns alone
         moments.gram[..., chosen[:, None], chosen],

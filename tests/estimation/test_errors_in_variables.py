@@ -1,0 +1,74 @@
+"""Denoised moments: attenuation goes, safety stays."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from casysid.errors import ParameterError
+from casysid.estimation import ErrorsInVariables, Ridge, WeightedLeastSquares
+from casysid.estimation.errors_in_variables import heaviest_noise
+from casysid.moments import Moments
+
+TRUTH = np.array([1.0, -2.0, 0.5])
+
+
+def noisy_problem(seed, noise, rows=4000, blocks=8):
+    """Inputs measured with white noise of known variance; each row's second moment has grown by it."""
+    rng = np.random.default_rng(seed)
+    clean = rng.normal(size=(rows, 3)) @ np.array([[1.0, 0.6, 0.1], [0.0, 1.0, 0.4], [0.0, 0.0, 0.5]])
+    x = clean + noise * rng.normal(size=clean.shape)
+    moments = Moments.from_rows(x, clean @ TRUTH + 0.1 * rng.normal(size=rows), blocks=blocks)
+    grown = np.zeros_like(moments.gram)
+    grown[:, 0, :3, :3] = noise**2 * np.eye(3) * moments.count[:, 0, None, None]
+    return dataclasses.replace(moments, noise=grown)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("noise", [0.1, 0.2])
+def test_the_attenuation_is_removed(seed, noise):
+    moments = noisy_problem(seed, noise)
+    plain = WeightedLeastSquares().estimate(moments).parameters
+    corrected = ErrorsInVariables(WeightedLeastSquares()).estimate(moments).parameters
+    assert np.linalg.norm(corrected - TRUTH) < 0.4 * np.linalg.norm(plain - TRUTH)
+
+
+def test_without_noise_it_is_the_estimator_itself():
+    moments = noisy_problem(0, 0.1)
+    for inner in (WeightedLeastSquares(), Ridge()):
+        quiet = dataclasses.replace(moments, noise=np.zeros_like(moments.gram))
+        silent = dataclasses.replace(moments, noise=None)
+        expected = inner.estimate(silent).parameters
+        assert ErrorsInVariables(inner).estimate(quiet).parameters == pytest.approx(expected, abs=1e-12)
+        assert ErrorsInVariables(inner).estimate(silent).parameters == pytest.approx(expected, abs=1e-12)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(0.5, 30.0))
+def test_heavy_noise_is_removed_only_as_far_as_is_safe(seed, overstated):
+    moments = noisy_problem(seed % 1000, 0.5)
+    assert moments.noise is not None
+    loud = dataclasses.replace(moments, noise=overstated * moments.noise)
+    estimate = ErrorsInVariables().estimate(loud)
+    removed = estimate.diagnostics["noise_removed"]
+    assert 0.0 < removed <= 1.0
+    assert np.isfinite(estimate.parameters).all()
+    left = loud.denoised(removed).pooled()
+    assert np.linalg.eigvalsh(left.xx).min() > 0.0
+    assert removed * heaviest_noise(loud) <= 0.95 + 1e-9
+
+
+def test_noise_follows_its_moments_through_shift_sum_and_choice():
+    moments, prior = noisy_problem(0, 0.2), np.array([0.3, 0.1, -0.2])
+    direct = moments.denoised().shifted(prior)
+    assert np.allclose(moments.shifted(prior).denoised().gram, direct.gram)
+    both = moments + moments
+    assert np.allclose(both.denoised().gram.sum(axis=0), 2 * moments.denoised().gram.sum(axis=0))
+    assert np.allclose(moments.select_blocks([1, 3]).denoised().gram, moments.denoised().gram[[1, 3]])
+
+
+def test_a_margin_outside_its_range_is_named():
+    with pytest.raises(ParameterError, match="margin must lie between 0 and 1"):
+        ErrorsInVariables(margin=1.0)
