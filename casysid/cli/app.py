@@ -7,8 +7,11 @@ from typing import Annotated
 import typer
 
 from casysid.cli.compare import compare
+from casysid.cli.excite import excite
 from casysid.cli.identify import identify
 from casysid.cli.info import info
+from casysid.cli.rehearse import rehearse
+from casysid.cli.validate import validate
 
 app = typer.Typer(
     name="casysid",
@@ -45,6 +48,13 @@ app.command(
     "casysid identify arm.xml run1.csv run2.parquet --held-out run3.csv"
 )(identify)
 app.command(epilog="Example: casysid compare arm.urdf excite.csv --split 0.6 --methods wls,ridge,lasso")(compare)
+app.command(
+    epilog="Examples: casysid excite arm.urdf --out excite  ·  casysid excite head --out next --log earlier.csv"
+)(excite)
+app.command(epilog="Examples: casysid rehearse head  ·  casysid rehearse arm.urdf --duration 20 --out rehearsal")(
+    rehearse
+)
+app.command(epilog="Example: casysid validate identified/identified.urdf other.csv")(validate)
 app.command(epilog="Examples: casysid info arm.urdf  ·  casysid info arm.urdf excite.csv.gz")(info)
 
 
