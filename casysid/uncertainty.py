@@ -1,8 +1,12 @@
 """How sure an answer is: from the estimate through the projection to links, drives and torques.
 
-Samples of the estimate's Gaussian, in the directions that the data see, are projected like the estimate itself, so that
-a law that binds narrows the answer as much as it really does. What the data do not see has infinite standard error,
-however near to the prior the projection has put it; only the laws' own bounds, such as positive mass, limit it.
+A parametric bootstrap: the answer is taken for the truth, estimates are drawn about it as the noise would scatter them,
+and each is projected as the estimate was. So a law that binds narrows the answer as much as it really does, and an
+answer on a bound is not taken for certain, as it would be if estimates far beyond the bound were drawn. What the data
+do not see has infinite standard error, however near to the prior the projection has put it; only the laws' own bounds,
+such as positive mass, limit it.
+
+Source: Efron and Tibshirani (1993), §6.5.
 """
 
 from __future__ import annotations
@@ -41,7 +45,7 @@ class ParameterUncertainty:
 
     Attributes:
         parameters: The answer, shape (p,).
-        covariance: Of every combination that the data see, after the projection; finite, shape (p, p).
+        covariance: Mean square error of every combination that the data see, after the projection; finite, (p, p).
         std: Of each parameter; infinite where the data do not tell it by itself, shape (p,).
         links: Mass, centre of mass and inertia about it (xx yy zz xy xz yz) of each link, shape (links, 10).
         link_std: Their standard errors, infinite likewise, shape (links, 10).
@@ -106,14 +110,15 @@ def propagate(
         nothing, free = np.zeros((0, len(non_negative))), np.zeros_like(non_negative)
         return _uncertainty(estimate.parameters, spread.covariance, spread, nothing, inertial, free)
     covariance = spread.covariance
-    drawn = estimate.parameters + _deviations(covariance, samples, seed)
+    answer = projection.parameters
+    drawn = answer + _deviations(covariance, samples, seed)
     if not (_is_free(problem, projection) and all(_is_inside(problem, point) for point in drawn)):
         projected = project_samples(problem, drawn, estimate.metric, prior, projection, residual_energy=residual_energy)
-        projected = projected[np.isfinite(projected).all(axis=1)]
-        covariance = np.cov(projected.T) if len(projected) > 1 else covariance
+        error = projected[np.isfinite(projected).all(axis=1)] - answer
+        covariance = error.T @ error / len(error) if len(error) else covariance
     rows = problem.constraints
     known = np.vstack([np.eye(len(rows.kept))[rows.kept], rows.matrix[rows.lower == rows.upper]])
-    return _uncertainty(projection.parameters, covariance, spread, known, inertial, non_negative)
+    return _uncertainty(answer, covariance, spread, known, inertial, non_negative)
 
 
 def torque_std(regressor: Regressor, covariance: Array, q: Array, v: Array, a: Array) -> Array:

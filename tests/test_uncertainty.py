@@ -16,7 +16,7 @@ from casysid.identification import Settings, identify
 from casysid.inertia import Consistency
 from casysid.moments import Moments
 from casysid.projection import link_mass
-from casysid.simulation import PlantSettings
+from casysid.simulation import NO_MECHANICS, PlantSettings
 from casysid.uncertainty import link_gradient, link_quantities, torque_std
 from tests.simulated import bundled_robot, simulated_run
 from tests.strategies import consistent_inertias, generators
@@ -98,7 +98,7 @@ def test_of_parameters_that_act_together_only_the_combination_is_known(rng):
     assert spread.sees(np.eye(5)).tolist() == [False, True, True, True, False]
     assert spread.sees(combination[None]).all()
     assert np.isinf(np.diag(spread.marked)).tolist() == [True, False, False, False, True]
-    assert np.sqrt(combination @ spread.covariance @ combination) == pytest.approx(alone.std[0], rel=0.15)
+    assert np.sqrt(combination @ spread.covariance @ combination) == pytest.approx(alone.std[0], rel=0.4)
 
 
 def test_a_direction_that_one_block_decides_has_a_standard_error():
@@ -157,6 +157,16 @@ def test_physics_does_not_make_combinations_less_sure(result):
     )
     assert (projected < 1.5 * free).all()
     assert (projected > 0.0).all()
+
+
+def test_an_answer_on_its_bound_is_not_taken_for_certain():
+    run = simulated_run("two_link.urdf", 0, PlantSettings(mechanics=NO_MECHANICS))
+    bare = bundled_robot("two_link.urdf").with_parameters(damping=np.zeros(2), dry_friction=np.zeros(2))
+    found = identify(bare, run.recording, Settings(cutoff=12.0, coulomb_width=0.01))
+    free = np.sqrt(np.diag(found.estimate.spread.covariance))
+    on_bound = [k for k, name in enumerate(found.regressor.names) if name in found.projection.active]
+    assert on_bound
+    assert (found.uncertainty.std[on_bound] > 0.2 * free[on_bound]).all()
 
 
 def test_torque_is_as_sure_as_the_parameters(result, monkeypatch):
