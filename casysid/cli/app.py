@@ -17,7 +17,7 @@ app = typer.Typer(
     name="casysid",
     no_args_is_help=True,
     add_completion=False,
-    rich_markup_mode="rich",
+    rich_markup_mode="markdown",
     help=(
         "Identify robot dynamics: from a URDF or MJCF and a log of joint positions and torques to a model "
         "a controller can trust."
