@@ -1,6 +1,6 @@
 """Rehearse the identification of a bundled robot: a machine that differs from its file, known only to the simulator.
 
-    python scripts/run_demo.py --out out/demo [--robot head] [--duration 20] [--seed 0]
+    python scripts/run_demo.py --out out/demo [--robot head] [--duration 15] [--seed 0]
 
 Writes what ``casysid rehearse`` writes: rehearsal.json, result.json, the identified model, report.html and pictures.
 """
@@ -23,7 +23,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument("--robot", default="head", help="a bundled model or a file")
-    parser.add_argument("--duration", type=float, default=20.0, help="of each recording [s]")
+    parser.add_argument("--duration", type=float, default=15.0, help="of each recording [s]")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     settings = RehearsalSettings(duration=options.duration, seed=options.seed, rate=420.0)
