@@ -229,13 +229,14 @@ def moving_moments(problem: LinearProblem, recordings: Sequence[Recording], cuto
         if cutoff is not None:
             torque = build_smoother(motion.time, cutoff).smooth(torque)
         q, v, a, tau = (x[::stride] for x in (motion.q, motion.v, motion.a, torque))
-        each = [
-            accumulate_moments(regressor, q, v, a, tau, valid=np.abs(v[:, k]) > standing[k], blocks=4, threads=1)
-            for k in range(v.shape[1])
-        ]
-        gram = np.stack([part.gram[:, k] for k, part in enumerate(each)], axis=1)
-        count = np.stack([part.count[:, k] for k, part in enumerate(each)], axis=1)
-        parts.append(Moments(gram, count, each[0].columns, each[0].joints))
+        p, dofs = len(regressor.names), regressor.robot.dofs
+        gram, count = np.zeros((4, len(dofs), p + 1, p + 1)), np.zeros((4, len(dofs)))
+        for k in range(len(dofs)):
+            moving = np.abs(v[:, k]) > standing[k]
+            if moving.sum() >= len(gram):  # else the joint stood all the time
+                part = accumulate_moments(regressor, q, v, a, tau, valid=moving, blocks=len(gram), threads=1)
+                gram[:, k], count[:, k] = part.gram[:, k], part.count[:, k]
+        parts.append(Moments(gram, count, regressor.names, dofs))
     return functools.reduce(operator.add, parts)
 
 
