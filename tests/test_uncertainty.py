@@ -66,13 +66,24 @@ def test_white_residuals_give_the_textbook_covariance():
     np.testing.assert_allclose(np.diag(found), np.diag(textbook), rtol=0.2)
 
 
-def test_ridge_takes_its_pull_for_a_prior():
+def test_ridge_is_as_sure_as_its_posterior_where_the_prior_is_right():
     rng = np.random.default_rng(1)
-    x = rng.standard_normal((40_000, 2)) @ np.array([[1.0, 1.0], [0.0, 1e-3]])
-    moments = Moments.from_rows(x, x @ TRUTH[:2] + rng.standard_normal(40_000), blocks=200)
-    estimate = Ridge(strength=1e-3).estimate(moments)
-    posterior = np.linalg.inv(estimate.metric)
-    np.testing.assert_allclose(np.diag(estimate.covariance), np.diag(posterior), rtol=0.2)
+    x = rng.standard_normal((40_000, 2)) @ np.array([[1.0, 1.0], [0.0, 1e-2]])
+    moments = Moments.from_rows(x, rng.standard_normal(40_000), blocks=200)
+    estimate, free = Ridge(strength=1e-3).estimate(moments), WeightedLeastSquares().estimate(moments)
+    posterior = np.sqrt(np.diag(np.linalg.inv(estimate.metric)))
+    assert (estimate.std > 0.8 * posterior).all()
+    assert (estimate.std < 2.0 * free.std).all()
+
+
+def test_ridge_admits_a_wrong_prior():
+    rng = np.random.default_rng(2)
+    x = rng.standard_normal((4_000, 2)) @ np.array([[1.0, 1.0], [0.0, 1e-2]])
+    moments = Moments.from_rows(x, x @ [3.0, -3.0] + 0.1 * rng.standard_normal(4_000), blocks=20)
+    estimate = Ridge(strength=1e-2).estimate(moments)
+    error = np.abs(estimate.parameters - [3.0, -3.0])
+    assert (error > 1.0).all()
+    assert (error < 2.5 * estimate.std).all()
 
 
 @LAWS

@@ -25,6 +25,8 @@ RANK_TOLERANCE = 1e-9
 """Eigenvalues of the information, scaled to unit diagonal, below this fraction of the largest are no knowledge."""
 HEAVIEST_BLOCK = 0.9
 """A direction of which one block holds more than this share says nothing of its own spread from block to block."""
+PRIOR_STEPS = 50
+"""Of the expectation-maximisation that finds how far off the prior is."""
 MOST_POOLED = 2.0
 """The pooled estimate never counts for more than so many times the degrees of freedom of the direct one."""
 
@@ -40,12 +42,13 @@ def block_covariance(moments: Moments, parameters: Array, weights: Array) -> Arr
 def covariance_from_blocks(moments: Moments, parameters: Array, weights: Array, pull: Array | None = None) -> Spread:
     """Covariance of least squares, or of ridge with the error that its pull to the prior brings.
 
-    Ridge's pull is what a Gaussian prior of the parameters would give, and is taken as one: to the noise comes the
-    spread about the prior that the strength stands for, ``C = (H + P)⁻¹ (M + κ P) (H + P)⁻¹`` with the mean inflation
-    ``κ``. For white residuals this is the posterior covariance.
+    Ridge's pull stands for a Gaussian prior of the parameters, whose variance is estimated together with the rest: to
+    the noise comes the error of what is pulled, ``C = (H + P)⁻¹ (M + τ² P) (H + P)⁻¹``. With ``τ²`` the variance of the
+    noise this would be the posterior covariance; it is more where the prior is farther off than the strength says, in
+    all directions together or, as far as least squares shows it, in one.
 
     Args:
-        moments: The fitted moments.
+        moments: The fitted moments, relative to the prior if there is a pull.
         parameters: ``θ``, shape (p,).
         weights: Row weights by joint, shape (joints,).
         pull: ``P``, shape (p, p): what a ridge adds to the weighted ``S_xx``; None for none.
@@ -63,16 +66,33 @@ def covariance_from_blocks(moments: Moments, parameters: Array, weights: Array, 
     scores = _scores_of(moments, parameters, weights, W)
     M, freedom = _covariance_of_scores(moments, scores, parameters, weights)
     scale = np.where(live, inverse, inverse.max(initial=0.0) or 1.0)
-    return Spread(W @ _pulled(M, W, pull) @ W.T, vectors[:, ~known], scale, freedom)
+    solution = W.T @ moments.pooled(weights).xy
+    return Spread(W @ _pulled(M, solution, W, pull) @ W.T, vectors[:, ~known], scale, freedom)
 
 
-def _pulled(meat: Array, W: Array, pull: Array | None) -> Array:
-    """``(1 + P)⁻¹ (M + κ P) (1 + P)⁻¹`` in directions of unit information."""
+def _pulled(meat: Array, solution: Array, W: Array, pull: Array | None) -> Array:
+    """``(1 + P)⁻¹ (M + τ² P) (1 + P)⁻¹`` in directions of unit information, where least squares is at ``solution``."""
     if pull is None or not len(meat):
         return meat
     P = W.T @ pull @ W
-    shrink = np.linalg.inv(np.eye(len(P)) + P)
-    return np.asarray(shrink @ (meat + np.trace(meat) / len(meat) * P) @ shrink)
+    strength, vectors = np.linalg.eigh(0.5 * (P + P.T))
+    strength = np.maximum(strength, 0.0)
+    off = vectors.T @ solution
+    spread = _prior_variance(strength, off, float(np.trace(meat)) / len(meat))
+    error = np.maximum(spread * strength, (strength * off) ** 2)
+    shrink = vectors / (1.0 + strength)
+    return np.asarray(shrink @ (vectors.T @ meat @ vectors + np.diag(error)) @ shrink.T)
+
+
+def _prior_variance(strength: Array, solution: Array, noise: float) -> float:
+    """``τ²`` of ``δ_k ~ N(0, τ² / p_k)`` from ``δ_k`` seen with a noise, at least the noise's (EM, Tipping 2001)."""
+    pulled = strength > 0.0
+    p, d = strength[pulled], solution[pulled]
+    spread = noise
+    for _ in range(PRIOR_STEPS if len(p) else 0):
+        variance = 1.0 / (p / spread + 1.0 / noise)
+        spread = float(np.mean(p * ((variance * d / noise) ** 2 + variance)))
+    return max(spread, noise)
 
 
 @dataclass(frozen=True, eq=False)
