@@ -37,6 +37,7 @@ from casysid.simulation import PD, ControlModel, Plant, PlantSettings, Sensing, 
 from casysid.validation import hidden_truth, measure_tracking, track, true_coefficients
 
 CUTOFF = 20.0  # [Hz], of the low-pass that all of the paper's methods share: twenty times the fastest sinusoid
+SOFT, STIFF = 3.0, 6.0  # [Hz], bandwidth of the feedback where tracking is judged, and in recordings
 PIECES = 8  # recordings, each along sinusoids of its own
 EVALUATION = 20.0  # [s] of each trajectory that is tracked
 STANDING = 0.1  # of the joint's root mean square velocity; and no less than
@@ -89,11 +90,13 @@ class Experiment:
         robot = Robot.from_file(find_model(f"{self.robot}.xml"))
         return Plant(robot, settings, hidden_truth(robot, settings.mechanics, self.seed))
 
-    def follow(self, plant: Plant, model: ControlModel, duration: float, motion: int) -> SimulatedRun:
+    def follow(
+        self, plant: Plant, model: ControlModel, duration: float, motion: int, bandwidth: float = SOFT
+    ) -> SimulatedRun:
         """Computed torque along the motion of that number; the gains are the same whatever the model."""
         seed = 1000 * self.seed + motion
         trajectory = design_sinusoids(plant.robot, duration=duration, seed=seed)
-        gains = PD.tuned(plant.robot, plant.parameters)
+        gains = PD.tuned(plant.robot, plant.parameters, bandwidth=bandwidth)
         return track(plant, model, gains, trajectory, rate=self.rate, duration=duration, seed=seed)
 
 
@@ -111,7 +114,7 @@ def record_piece(experiment: Experiment, piece: int, folder: Path) -> Path:
     count = experiment.samples * experiment.stride // PIECES
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CasysidWarning)
-        run = experiment.follow(plant, ControlModel.from_robot(plant.robot), count / experiment.rate, piece)
+        run = experiment.follow(plant, ControlModel.from_robot(plant.robot), count / experiment.rate, piece, STIFF)
     rows = slice(None, None, experiment.stride)
     path = folder / f"{experiment.robot}-{experiment.seed}-{experiment.noise:g}-{piece}.npz"
     log = run.recording

@@ -53,7 +53,8 @@ class RehearsalSettings:
         friction_spread: How far friction and armature do.
         plant: What the machine does beside rigid-body dynamics, and its sensors.
         identification: Of the pipeline.
-        bandwidth: Of the feedback [Hz].
+        recording_bandwidth: Of the feedback while recording [Hz]: stiff, so that friction holds no joint.
+        bandwidth: Of the feedback while tracking is judged [Hz]: soft, so that the model shows.
     """
 
     duration: float = 30.0
@@ -63,6 +64,7 @@ class RehearsalSettings:
     friction_spread: float = 0.3
     plant: PlantSettings = field(default_factory=PlantSettings)
     identification: Settings = field(default_factory=Settings)
+    recording_bandwidth: float = 6.0
     bandwidth: float = 3.0
 
     def __post_init__(self) -> None:
@@ -135,11 +137,9 @@ def rehearse(robot: Robot, settings: RehearsalSettings | None = None, progress: 
     """
     settings = settings or RehearsalSettings()
     plant = build_machine(robot, settings)
+    drill = _Drill(plant, settings, progress)
     believed = ControlModel.from_robot(robot)
-    train, held_out = (
-        _run(plant, believed, settings, settings.duration, k, name, progress)
-        for k, name in enumerate(("record", "record again"))
-    )
+    train, held_out = (drill.record(believed, k, stage) for k, stage in enumerate(("record", "record again")))
     result = identify(robot, train.recording, settings.identification, held_out=[held_out.recording], progress=progress)
     regressor = result.regressor
     parameters = {
@@ -147,18 +147,7 @@ def rehearse(robot: Robot, settings: RehearsalSettings | None = None, progress: 
         "identified": result.parameters,
         "true": true_coefficients(plant, regressor),
     }
-    runs = {
-        name: _run(
-            plant,
-            ControlModel(regressor, theta),
-            settings,
-            min(settings.duration, LONGEST_TRACKING),
-            2,
-            f"track: {name}",
-            progress,
-        )
-        for name, theta in parameters.items()
-    }
+    runs = {name: drill.track(ControlModel(regressor, theta), f"track: {name}") for name, theta in parameters.items()}
     return Rehearsal(
         settings=settings,
         plant=plant,
@@ -184,23 +173,30 @@ def build_machine(robot: Robot, settings: RehearsalSettings) -> Plant:
     return Plant(robot, settings.plant, truth)
 
 
-def _run(
-    plant: Plant,
-    model: ControlModel,
-    settings: RehearsalSettings,
-    duration: float,
-    number: int,
-    stage: str,
-    progress: Progress,
-) -> SimulatedRun:
-    """The ``number``-th motion of the rehearsal; gains are as one would have tuned them on the machine."""
-    progress(stage, 0.0)
-    seed = 3 * settings.seed + number
-    motion = design_sinusoids(plant.robot, duration=duration, seed=seed)
-    gains = PD.tuned(plant.robot, plant.parameters, bandwidth=settings.bandwidth)
-    run = track(plant, model, gains, motion, rate=settings.rate, duration=duration, seed=seed)
-    progress(stage, 1.0)
-    return run
+@dataclass(frozen=True, eq=False)
+class _Drill:
+    """The motions of a rehearsal, numbered; gains are as one would have tuned them on the machine."""
+
+    plant: Plant
+    settings: RehearsalSettings
+    progress: Progress
+
+    def record(self, model: ControlModel, number: int, stage: str) -> SimulatedRun:
+        """A motion to fit or to predict."""
+        return self._run(model, number, stage, self.settings.duration, self.settings.recording_bandwidth)
+
+    def track(self, model: ControlModel, stage: str) -> SimulatedRun:
+        """The motion on which models are compared."""
+        return self._run(model, 2, stage, min(self.settings.duration, LONGEST_TRACKING), self.settings.bandwidth)
+
+    def _run(self, model: ControlModel, number: int, stage: str, duration: float, bandwidth: float) -> SimulatedRun:
+        self.progress(stage, 0.0)
+        plant, seed = self.plant, 3 * self.settings.seed + number
+        motion = design_sinusoids(plant.robot, duration=duration, seed=seed)
+        gains = PD.tuned(plant.robot, plant.parameters, bandwidth=bandwidth)
+        run = track(plant, model, gains, motion, rate=self.settings.rate, duration=duration, seed=seed)
+        self.progress(stage, 1.0)
+        return run
 
 
 def _relative(result: IdentificationResult) -> float:
