@@ -9,38 +9,70 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from casysid.bundled import find_model as find_model
     from casysid.dynamics import Coupling as Coupling
     from casysid.dynamics import build_dynamics as build_dynamics
     from casysid.dynamics import build_regressor as build_regressor
+    from casysid.dynamics import generate_c as generate_c
+    from casysid.estimation import ErrorsInVariables as ErrorsInVariables
     from casysid.estimation import OrdinaryLeastSquares as OrdinaryLeastSquares
     from casysid.estimation import Ridge as Ridge
     from casysid.estimation import WeightedLeastSquares as WeightedLeastSquares
+    from casysid.excitation import build_excitation as build_excitation
+    from casysid.excitation import design_excitation as design_excitation
+    from casysid.excitation import write_excitation as write_excitation
     from casysid.identification import IdentificationResult as IdentificationResult
     from casysid.identification import Settings as Settings
+    from casysid.identification import compare as compare
     from casysid.identification import identify as identify
+    from casysid.identification import prepare as prepare
+    from casysid.identification.output import write_result as write_result
+    from casysid.inertia import Consistency as Consistency
     from casysid.moments import Moments as Moments
     from casysid.recording import Recording as Recording
     from casysid.recording import read_recording as read_recording
     from casysid.recording import read_recordings as read_recordings
+    from casysid.report import write_report as write_report
     from casysid.robot import Robot as Robot
+    from casysid.robot import write_robot as write_robot
+    from casysid.simulation import ComputedTorque as ComputedTorque
+    from casysid.simulation import Plant as Plant
+    from casysid.simulation import simulate as simulate
+    from casysid.validation import rehearse as rehearse
 
 __version__ = "0.1.0"
 
 _HOMES = {
+    "ComputedTorque": "casysid.simulation",
+    "Consistency": "casysid.inertia",
     "Coupling": "casysid.dynamics",
+    "ErrorsInVariables": "casysid.estimation",
     "IdentificationResult": "casysid.identification",
     "Moments": "casysid.moments",
     "OrdinaryLeastSquares": "casysid.estimation",
+    "Plant": "casysid.simulation",
     "Recording": "casysid.recording",
     "Ridge": "casysid.estimation",
     "Robot": "casysid.robot",
     "Settings": "casysid.identification",
     "WeightedLeastSquares": "casysid.estimation",
     "build_dynamics": "casysid.dynamics",
+    "build_excitation": "casysid.excitation",
     "build_regressor": "casysid.dynamics",
+    "compare": "casysid.identification",
+    "design_excitation": "casysid.excitation",
+    "find_model": "casysid.bundled",
+    "generate_c": "casysid.dynamics",
     "identify": "casysid.identification",
+    "prepare": "casysid.identification",
     "read_recording": "casysid.recording",
     "read_recordings": "casysid.recording",
+    "rehearse": "casysid.validation",
+    "simulate": "casysid.simulation",
+    "write_excitation": "casysid.excitation",
+    "write_report": "casysid.report",
+    "write_result": "casysid.identification.output",
+    "write_robot": "casysid.robot",
 }
 
 __all__ = sorted(_HOMES)

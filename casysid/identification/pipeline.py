@@ -24,6 +24,8 @@ from casysid.robot import Robot
 from casysid.signals import Motion
 from casysid.uncertainty import ParameterUncertainty, propagate
 
+PRIOR_BUDGET = 0.03
+"""Share of the residual energy that may be spent on staying near the model file where the data hardly see."""
 Progress = Callable[[str, float], None]
 """Told the stage and the share of it that is done."""
 
@@ -147,7 +149,12 @@ def _project(
     if settings.consistency is None:
         return None, propagate(estimate, moments, regressor.parameters)
     progress("projection", 0.0)
-    projection = build_projection(regressor.parameters, consistency=settings.consistency, knowledge=settings.knowledge)
+    projection = build_projection(
+        regressor.parameters,
+        consistency=settings.consistency,
+        knowledge=settings.knowledge,
+        prior_budget=PRIOR_BUDGET,
+    )
     energy = moments.pooled(estimate.noise_std**-2.0).residual_energy(estimate.parameters)
     prior = regressor.prior
     found = project(projection, estimate.parameters, estimate.metric, prior, residual_energy=energy)
