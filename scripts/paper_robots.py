@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import importlib
 import operator
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -25,6 +24,7 @@ from casysid.dynamics import DEFAULT_FRICTION, FrictionColumn, Regressor, Viscou
 from casysid.errors import CasysidError, CasysidWarning
 from casysid.estimation import LassoRegression, Ridge, StepwiseRegression, WeightedLeastSquares
 from casysid.estimation.base import Estimate, Estimator
+from casysid.estimation.bayesian import BayesianDenoising
 from casysid.identification import Settings, choose_cutoff
 from casysid.identification.coulomb import choose_relative_width
 from casysid.identification.problem import USUAL_WIDTH, LinearProblem, build_problem, coulomb_width
@@ -263,14 +263,8 @@ def true_parameters(
     return ControlModel(problem.regressor, true_coefficients(plant, problem.regressor)), ""
 
 
-def bayesian_denoising() -> Method | None:
-    """The paper's own method, if this version has it."""
-    estimation = importlib.import_module("casysid.estimation")
-    kind = getattr(estimation, "BayesianDenoising", None)
-    return None if kind is None else by_estimator(kind())
-
-
 METHODS: dict[str, Method] = {
+    "Bayesian de-noising": by_estimator(BayesianDenoising()),
     "ridge (cross-validated)": by_estimator(Ridge()),
     "ridge (hand-tuned)": hand_tuned_ridge,
     "LASSO": by_estimator(LassoRegression()),
@@ -279,5 +273,3 @@ METHODS: dict[str, Method] = {
     "model file": file_parameters,
     "true parameters": true_parameters,
 }
-if (_denoising := bayesian_denoising()) is not None:
-    METHODS = {"Bayesian de-noising": _denoising, **METHODS}
