@@ -8,8 +8,8 @@ torques; positions have noise and steps, and are smoothed and differentiated.
 
 What no column of the regressor stands for is a bias and no matter of intervals, and is left out: stiction, cables,
 torques that are logged later than positions, and torques that jump between samples (motors are made slower than the
-controller's period). Dry friction is left out too, because low-passed torques and the friction of low-passed velocities
-are not the same near standstill; ``--dry`` puts it back and shows what that costs.
+controller's period). Dry friction, whose change of sign the regressor has by a smooth function only, is left out too;
+``--dry`` puts it back.
 """
 
 from __future__ import annotations
