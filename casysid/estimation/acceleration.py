@@ -18,15 +18,11 @@ from casysid.arrays import Array
 
 MEMORY = 8
 """Steps from which the curvature is learnt."""
-WARM_UP = 10
-"""EM iterations before the first quasi-Newton step."""
 CYCLE = 10
 """Iterations over which the gain of the bound is judged."""
-METRIC_AGE = 10
-"""Iterations for which a metric is kept."""
 SUFFICIENT = 1e-4
 """Least share of the gain promised by the gradient (Armijo)."""
-LENGTHS = (1.0, 0.2, 0.04)
+LENGTHS = (1.0, 0.2, 0.04, 0.008, 0.0016)
 """Of the quasi-Newton step, tried in this order."""
 
 
@@ -65,7 +61,7 @@ class Ascent:
         point: The last point.
         bounds: The bound at the start and after every iteration; it never falls.
         evaluations: How often the bound was computed.
-        em_steps: Iterations that were EM's, the warm-up included.
+        em_steps: Iterations that were EM's.
         converged: Whether the bound had come to rest.
     """
 
@@ -83,6 +79,7 @@ def ascend(
     *,
     tolerance: float,
     max_iterations: int,
+    metric_age: int,
 ) -> Ascent:
     """Climb until the bound's relative gain over a cycle of iterations is below ``tolerance``.
 
@@ -92,11 +89,11 @@ def ascend(
         limits: Lowest and highest admissible vector.
         tolerance: Relative gain of the bound over a cycle.
         max_iterations: Iterations at most.
+        metric_age: Iterations for which a metric is kept.
     """
-    climber = _Climber(evaluate, evaluate(start), limits)
+    climber = _Climber(evaluate, evaluate(start), limits, metric_age)
     while len(climber.bounds) <= max_iterations:
-        stepped = len(climber.bounds) > WARM_UP and (climber.quasi_newton_step() or climber.quasi_newton_step())
-        if not stepped and not climber.em_step():
+        if not (climber.quasi_newton_step() or climber.quasi_newton_step() or climber.em_step()):
             return climber.ended(converged=True)  # EM cannot lose but by rounding: this is as far as it goes
         recent = climber.bounds[-CYCLE - 1 :]
         if len(recent) > CYCLE and recent[-1] - recent[0] <= tolerance * abs(recent[-1]):
@@ -107,9 +104,11 @@ def ascend(
 class _Climber:
     """The state of one climb."""
 
-    def __init__(self, evaluate: Callable[[Array], Point], point: Point, limits: tuple[Array, Array]) -> None:
+    def __init__(
+        self, evaluate: Callable[[Array], Point], point: Point, limits: tuple[Array, Array], metric_age: int
+    ) -> None:
         self.bounds = [point.bound]
-        self._evaluate, self._point, self._limits = evaluate, point, limits
+        self._evaluate, self._point, self._limits, self._metric_age = evaluate, point, limits, metric_age
         self._evaluations, self._em_steps = 1, 0
         self._forget()
 
@@ -152,7 +151,7 @@ class _Climber:
 
     def _forget(self) -> None:
         self._pairs: deque[tuple[Array, Array, float]] = deque(maxlen=MEMORY)
-        self._age = METRIC_AGE
+        self._age = self._metric_age
 
     def _learn(self, step: Array, change: Array) -> None:
         """Take in a step and by how much the gradient fell along it."""
@@ -162,7 +161,7 @@ class _Climber:
 
     def _direction(self) -> Array:
         """Nocedal and Wright, Algorithm 7.4, the metric in place of a multiple of the unit matrix."""
-        if self._age >= METRIC_AGE:
+        if self._age >= self._metric_age:
             self._metric, self._age = self._point.metric(), 0
         self._age += 1
         q, shares = self._point.gradient.copy(), []

@@ -40,7 +40,7 @@ class Start:
     """
 
     noise_fraction: float
-    ridge: float
+    ridge: float = 1e-2
 
     def __post_init__(self) -> None:
         if not (0.0 < self.noise_fraction < 1.0 and 0.0 < self.ridge < np.inf):
@@ -54,7 +54,9 @@ class Start:
         return state_from(model, coefficients, np.full_like(coefficients, self.noise_fraction))
 
 
-STARTS = (Start(0.2, 1e-3), Start(0.05, 1e-5), Start(0.5, 1e-1))
+STARTS = (Start(0.05), Start(0.1), Start(0.2))
+WARM_UP = 100
+"""Iterations of plain EM at the beginning; without them, starts end in different optima more often."""
 LARGEST_SHARE = 1.0 - 1e-6
 
 
@@ -226,11 +228,14 @@ def denoise(
 
 
 def climb(model: DenoisingModel, state: State, *, tolerance: float, max_iterations: int) -> Ascent:
-    """Accelerated EM from one state."""
+    """Some iterations of plain EM from one state, then accelerated ones."""
+    for _ in range(min(WARM_UP, max_iterations)):
+        state = model.maximise(state, model.expect(state))
     return ascend(
         lambda vector: CoordinatePoint(model, vector),
         to_vector(model, state),
         limits(model),
         tolerance=tolerance,
         max_iterations=max_iterations,
+        metric_age=max(3, len(model.energy) // 40),  # factorisations then cost O(d²) an iteration
     )

@@ -31,7 +31,7 @@ from casysid.estimation.denoising_em import LOG_2PI, DenoisingModel, State
 
 LEAST_CURVATURE = 0.05
 """Of the logit of f, which is nearly flat where a column is all noise or none."""
-LARGEST_ODDS = 1e24
+LARGEST_ODDS = 1e12
 """Of f, and of 1 - f: beyond, a column is all noise, or none."""
 JITTER = 1e-10
 """Keeps the curvature of h positive definite where columns are dependent, as a fraction of the columns' energy."""

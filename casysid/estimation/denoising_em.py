@@ -39,7 +39,7 @@ class GammaPrior:
         rate: The paper's ``b_α0``.
     """
 
-    shape: float = 1e-6
+    shape: float = 0.25
     rate: float = 1e-6
 
     def __post_init__(self) -> None:
