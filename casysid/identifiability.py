@@ -21,6 +21,8 @@ from casysid.robot.coordinates import state_from_channels
 
 RANK_TOLERANCE = 3e-5
 """Relative singular values below this are rounding of the model's angles (four digits give 1e-6), not rank."""
+ROUNDING = 1e-13
+"""Eigenvalues of a Gram matrix below this fraction of the largest are rounding of the arithmetic."""
 QUIETEST_COLUMN = 1e-8
 """Columns smaller than this fraction of the largest are rounding of the arithmetic."""
 COEFFICIENT_TOLERANCE = 1e-3
@@ -100,7 +102,8 @@ def base_parameters_of_gram(
     live = energy > quietest**2 * max(energy.max(initial=0.0), np.finfo(np.float64).tiny)
     scale = np.where(live, 1.0 / np.sqrt(np.where(live, energy, 1.0)), 0.0)
     values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
-    root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T  # rows whose Gram is the standardised one
+    sound = values > ROUNDING * max(values.max(initial=0.0), np.finfo(np.float64).tiny)
+    root = np.sqrt(values[sound])[:, None] * vectors[:, sound].T  # rows whose Gram is the standardised one
     independent = _independent_columns(root, live, tolerance)
     weights = np.linalg.lstsq(root[:, independent], root, rcond=None)[0]
     transform = weights * scale[independent][:, None] / np.where(live, scale, 1.0)
