@@ -2,8 +2,10 @@
 
 from casysid.errors import ParameterError
 from casysid.estimation.base import Estimate, Estimator, Status
+from casysid.estimation.bayesian import BayesianDenoising
 from casysid.estimation.cross_validation import cross_validated_energy
 from casysid.estimation.errors_in_variables import ErrorsInVariables
+from casysid.estimation.joint_factor_analysis import JointFactorAnalysis
 from casysid.estimation.lasso import LassoRegression
 from casysid.estimation.least_squares import OrdinaryLeastSquares, WeightedLeastSquares
 from casysid.estimation.partial_least_squares import PartialLeastSquares
@@ -17,6 +19,8 @@ ESTIMATORS: tuple[type[Estimator], ...] = (
     WeightedLeastSquares,
     Ridge,
     ErrorsInVariables,
+    BayesianDenoising,
+    JointFactorAnalysis,
     LassoRegression,
     StepwiseRegression,
     PartialLeastSquares,
@@ -36,9 +40,11 @@ def estimator_by_name(name: str) -> Estimator:
 
 __all__ = [
     "ESTIMATORS",
+    "BayesianDenoising",
     "ErrorsInVariables",
     "Estimate",
     "Estimator",
+    "JointFactorAnalysis",
     "LassoRegression",
     "OrdinaryLeastSquares",
     "PartialLeastSquares",
