@@ -86,7 +86,7 @@ def _patch_friction(patch: XmlPatch, robot: Robot, joint: Joint, source: UrdfJoi
 
 def _armature_notes(robot: Robot) -> list[str]:
     values = ", ".join(
-        f"{joint.name} {number_text(robot.armature[joint.v])}"
+        f"{joint.name} " + " ".join(f"{value:.6g}" for value in robot.armature[joint.v])
         for joint in robot.joints
         if robot.armature[joint.v].any()
     )
