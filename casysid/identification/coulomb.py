@@ -22,8 +22,9 @@ from casysid.robot import Robot
 
 RELATIVE_WIDTHS = (3e-4, 1.5e-3, USUAL_WIDTH, 2e-2, 6e-2)
 """Candidates, in root mean square velocities of the joint."""
-WORTHWHILE_GAIN = 0.03
-"""The sharpest width within this share of the least error is taken: a step is the model, a slope needs evidence."""
+WORTHWHILE_GAIN = 0.10
+"""The sharpest width within this share of the least error is taken. A step is the model; a slope needs strong evidence,
+because it trades viscous friction against Coulomb's."""
 
 
 def choose_relative_width(
