@@ -58,14 +58,14 @@ class Ascent:
     """Where the climb ended.
 
     Attributes:
-        point: The last point.
+        vector: The last vector.
         bounds: The bound at the start and after every iteration; it never falls.
         evaluations: How often the bound was computed.
         em_steps: Iterations that were EM's.
         converged: Whether the bound had come to rest.
     """
 
-    point: Point
+    vector: Array
     bounds: tuple[float, ...]
     evaluations: int
     em_steps: int
@@ -114,7 +114,7 @@ class _Climber:
 
     def ended(self, *, converged: bool) -> Ascent:
         """The result."""
-        return Ascent(self._point, tuple(self.bounds), self._evaluations, self._em_steps, converged)
+        return Ascent(self._point.vector, tuple(self.bounds), self._evaluations, self._em_steps, converged)
 
     def em_step(self) -> bool:
         """EM's step, after which nothing learnt holds; False if it does not raise the bound."""

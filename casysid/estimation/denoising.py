@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError
-from casysid.estimation.acceleration import Ascent, ascend
+from casysid.estimation.acceleration import ascend
 from casysid.estimation.base import Status
 from casysid.estimation.denoising_coordinates import CoordinatePoint, limits, to_vector
 from casysid.estimation.denoising_em import DenoisingModel, GammaPrior, State
@@ -208,8 +208,8 @@ def denoise(
     model = DenoisingModel(normal, prior)
     states = [start.state(model) if isinstance(start, Start) else start for start in starts]
     climbs = [climb(model, state, tolerance=tolerance, max_iterations=max_iterations) for state in states]
-    best = max(climbs, key=lambda ascent: ascent.bounds[-1])
-    state = CoordinatePoint(model, best.point.vector).state()
+    best = max(climbs, key=lambda one: one.bounds[-1])
+    state = best.state
     return DenoisingPosterior(
         output_weight=state.wz,
         input_weight=state.wx,
@@ -221,21 +221,43 @@ def denoise(
         relevance=model.expect(state).alpha,
         prior=prior,
         bounds=np.array(best.bounds),
-        start_bounds=np.array([ascent.bounds[-1] for ascent in climbs]),
+        start_bounds=np.array([one.bounds[-1] for one in climbs]),
         evaluations=best.evaluations,
         status=Status.CONVERGED if best.converged else Status.MAX_ITERATIONS,
     )
 
 
-def climb(model: DenoisingModel, state: State, *, tolerance: float, max_iterations: int) -> Ascent:
+@dataclass(frozen=True, eq=False)
+class Climb:
+    """Where EM went from one start.
+
+    Attributes:
+        state: The last state.
+        bounds: The bound at the start and after every iteration.
+        evaluations: E-steps, or computations of the bound and its gradient, which cost about the same.
+        converged: Whether the bound had come to rest.
+    """
+
+    state: State
+    bounds: tuple[float, ...]
+    evaluations: int
+    converged: bool
+
+
+def climb(model: DenoisingModel, state: State, *, tolerance: float, max_iterations: int) -> Climb:
     """Some iterations of plain EM from one state, then accelerated ones."""
+    bounds = []
     for _ in range(min(WARM_UP, max_iterations)):
-        state = model.maximise(state, model.expect(state))
-    return ascend(
+        expected = model.expect(state)
+        bounds.append(expected.bound)
+        state = model.maximise(state, expected)
+    ascent = ascend(
         lambda vector: CoordinatePoint(model, vector),
         to_vector(model, state),
         limits(model),
         tolerance=tolerance,
-        max_iterations=max_iterations,
+        max_iterations=max_iterations - len(bounds),
         metric_age=max(3, len(model.energy) // 40),  # factorisations then cost O(d²) an iteration
     )
+    state = CoordinatePoint(model, ascent.vector).state()
+    return Climb(state, (*bounds, *ascent.bounds), len(bounds) + ascent.evaluations, ascent.converged)
