@@ -193,10 +193,14 @@ class DenoisingFit:
 
     @property
     def metric(self) -> Array:
-        """``G = Σ x xᵀ / σ² + N diag(ψx)`` as the paper's Eq. (8) prints it, in the regressor's units, shape (p, p)."""
+        """``G = Σ x xᵀ / σ² + N diag(ψx)`` as the paper's Eq. (8) prints it, in the regressor's units, shape (p, p).
+
+        ψx is that of relevant columns. Of a column that is switched off ψx is the whole, which says that it is not used
+        and not that it is noise; with it, a projection would give up torque to keep useless columns where they are.
+        """
         metric: Array = self.problem.metric * self.problem.noise_std[0] ** 2  # pooled rows were divided by σ before
         live = self.problem.live
-        metric[live, live] *= 1.0 + self.input_noise
+        metric[live, live] *= 1.0 + np.where(self.posterior.is_relevant, self.input_noise, 0.0)
         return metric
 
     def seen_part(self, coefficients: Array) -> Array:
