@@ -54,20 +54,28 @@ class Start:
         return state_from(model, coefficients, np.full_like(coefficients, self.noise_fraction))
 
 
-STARTS = (Start(0.05), Start(0.1), Start(0.2))
+STARTS = (Start(0.05, 1e-7), Start(0.1), Start(0.2))
 WARM_UP = 100
 """Iterations of plain EM at the beginning; without them, starts end in different optima more often."""
 LARGEST_SHARE = 1.0 - 1e-6
 
 
 def state_from(model: DenoisingModel, coefficients: Array, noise_fraction: Array) -> State:
-    """A state whose noisy regression vector (d,) and share of noise by column (d,) are the given ones."""
+    """A state whose noisy regression vector and shares of noise, shape (d,), are the given ones.
+
+    The shares are lowered in common as far as they would make more noise in the output than its residual shows.
+    """
     n, d = model.normal.count, len(coefficients)
-    mean_square = model.energy / n
+    mean_square, residual = model.energy / n, model.normal.residual_energy(coefficients) / n
     share = np.minimum(noise_fraction, LARGEST_SHARE)
+    odds = share / (1.0 - share)
+    spent = float((coefficients**2 * mean_square * odds).sum())
+    if spent > residual:
+        odds = odds * (residual / spent)
+        share = odds / (1.0 + odds)
     wx = np.sqrt(mean_square * (1.0 - share))
     floor_x, floor_y = model.least_noise
-    psi_y = max(0.5 * model.normal.residual_energy(coefficients) / n, floor_y)
+    psi_y = max(0.5 * residual, floor_y)
     psi_x, psi_z = np.maximum(mean_square * share, floor_x), np.full(d, max(psi_y / d, floor_y))
     known = np.zeros(d) if model.prior is None else np.ones(d)
     return State(coefficients * mean_square / wx, wx, psi_x, psi_z, known * psi_z / n, known * psi_x / n, psi_y)

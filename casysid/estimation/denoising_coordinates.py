@@ -31,8 +31,8 @@ from casysid.estimation.denoising_em import LOG_2PI, DenoisingModel, State
 
 LEAST_CURVATURE = 0.05
 """Of the logit of f, which is nearly flat where a column is all noise or none."""
-LARGEST_ODDS = 1e12
-"""Of f, and of 1 - f: beyond, a column is all noise, or none."""
+ODDS = (1e-18, 1e12)
+"""Least and largest odds of f: below a column is free of noise, above it is all noise."""
 JITTER = 1e-10
 """Keeps the curvature of h positive definite where columns are dependent, as a fraction of the columns' energy."""
 
@@ -45,7 +45,7 @@ def to_vector(model: DenoisingModel, state: State) -> Array:
     signal = wx * wx / kappa
     v = signal + psi_x
     D = psi_y + float((psi_z + wz * wz / kappa * psi_x / v).sum())
-    odds = np.clip(psi_x / np.maximum(signal, LARGEST_ODDS**-1 * psi_x), LARGEST_ODDS**-1, LARGEST_ODDS)
+    odds = np.clip(psi_x / np.maximum(signal, psi_x / ODDS[1]), *ODDS)
     parts = [wx * wz / (kappa * v), np.log(v), np.log(odds), np.log(psi_z), np.log([psi_y, D])]
     return np.concatenate(parts if model.prior is None else [*parts, np.log(rho_z), np.log(rho_x)])
 
@@ -54,8 +54,8 @@ def limits(model: DenoisingModel) -> tuple[Array, Array]:
     """Lowest and highest vector: of D, which without noise would fall for ever, and of the odds of f."""
     d = len(model.energy)
     highest = np.full((4 if model.prior is None else 6) * d + 2, np.inf)
-    highest[2 * d : 3 * d] = np.log(LARGEST_ODDS)
     lowest = -highest
+    lowest[2 * d : 3 * d], highest[2 * d : 3 * d] = np.log(ODDS)
     lowest[4 * d + 1] = np.log((d + 1) * model.least_noise[1])
     return lowest, highest
 

@@ -108,13 +108,18 @@ def test_the_prior_takes_about_a_quarter_for_noise_where_the_data_leave_it_open(
     )  # ½ log f + (1 + a0) log(1 - f)
 
 
-def test_a_state_has_the_vector_and_the_noise_that_were_asked_for() -> None:
+@pytest.mark.parametrize("size", [1.0, 100.0])
+def test_a_state_has_the_vector_asked_for_and_as_much_noise_as_the_residual_allows(size: float) -> None:
     normal = draw_normal(0)
-    coefficients, fraction = np.linspace(-1.0, 1.0, 8), np.linspace(0.1, 0.8, 8)
+    coefficients, fraction = size * np.linspace(-1.0, 1.0, 8), np.linspace(0.1, 0.8, 8)
     state = state_from(DenoisingModel(normal, GammaPrior()), coefficients, fraction)
     mean_square = state.wx**2 + state.psi_x
     np.testing.assert_allclose(state.wz * state.wx / mean_square, coefficients)
-    np.testing.assert_allclose(state.psi_x / mean_square, fraction)
+    np.testing.assert_allclose(mean_square, np.diag(normal.xx) / normal.count)
+    odds, asked = state.psi_x / state.wx**2, fraction / (1.0 - fraction)
+    made = coefficients**2 @ (mean_square * asked)  # of the output's variance
+    allowed = normal.residual_energy(coefficients) / normal.count
+    np.testing.assert_allclose(odds, asked * min(1.0, allowed / made))
 
 
 def test_running_out_of_iterations_is_said() -> None:
