@@ -40,6 +40,11 @@ class Point(Protocol):
         ...
 
     @property
+    def rounding(self) -> float:
+        """How far the bound can be off for rounding."""
+        ...
+
+    @property
     def gradient(self) -> Array:
         """Of the bound."""
         ...
@@ -62,7 +67,8 @@ class Ascent:
         bounds: The bound at the start and after every iteration; it never falls.
         evaluations: How often the bound was computed.
         em_steps: Iterations that were EM's.
-        converged: Whether the bound had come to rest.
+        converged: Whether the bound had come to rest; if not, iterations ran out or no step raises it although the
+            gradient promises more than rounding can hide.
     """
 
     vector: Array
@@ -94,7 +100,7 @@ def ascend(
     climber = _Climber(evaluate, evaluate(start), limits, metric_age)
     while len(climber.bounds) <= max_iterations:
         if not (climber.quasi_newton_step() or climber.quasi_newton_step() or climber.em_step()):
-            return climber.ended(converged=True)  # EM cannot lose but by rounding: this is as far as it goes
+            return climber.ended(converged=climber.promises_no_more_than(tolerance))
         recent = climber.bounds[-CYCLE - 1 :]
         if len(recent) > CYCLE and recent[-1] - recent[0] <= tolerance * abs(recent[-1]):
             return climber.ended(converged=True)
@@ -109,12 +115,16 @@ class _Climber:
     ) -> None:
         self.bounds = [point.bound]
         self._evaluate, self._point, self._limits, self._metric_age = evaluate, point, limits, metric_age
-        self._evaluations, self._em_steps = 1, 0
+        self._evaluations, self._em_steps, self._promise = 1, 0, np.inf
         self._forget()
 
     def ended(self, *, converged: bool) -> Ascent:
         """The result."""
         return Ascent(self._point.vector, tuple(self.bounds), self._evaluations, self._em_steps, converged)
+
+    def promises_no_more_than(self, tolerance: float) -> bool:
+        """Whether the gradient along the last direction promises less than ``tolerance`` (relative), or rounding."""
+        return abs(self._promise) <= max(tolerance * abs(self.bounds[-1]), self._point.rounding)
 
     def em_step(self) -> bool:
         """EM's step, after which nothing learnt holds; False if it does not raise the bound."""
@@ -132,7 +142,7 @@ class _Climber:
         x, direction = self._point.vector, self._direction()
         lowest, highest = self._limits
         direction[((x <= lowest) & (direction < 0.0)) | ((x >= highest) & (direction > 0.0))] = 0.0
-        slope = float(self._point.gradient @ direction)
+        self._promise = slope = float(self._point.gradient @ direction)
         for length in LENGTHS if 0.0 < slope < np.inf else ():
             with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
                 trial = self._evaluate(np.clip(x + length * direction, lowest, highest))

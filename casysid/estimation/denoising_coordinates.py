@@ -79,13 +79,18 @@ class CoordinatePoint:
             return -np.inf
         at, prior = self._at, self.model.prior
         n, d = self.model.normal.count, len(at.h)
-        log_det = d * LOG_2PI + LOG_2PI + float(self.vector[d : 2 * d].sum()) + float(self.vector[4 * d + 1])
+        log_det = (d + 1) * LOG_2PI + float(self.vector[d : 2 * d].sum() + self.vector[4 * d + 1])
         bound = -0.5 * (n * log_det + float((self.model.energy / at.v).sum()) + self._residual[1] / at.D)
         if prior is not None:
             log_variances = float(self.vector[4 * d + 2 :].sum() + np.log(at.v * at.f * at.psi_z).sum())
             bound += 0.5 * (log_variances - n * float(np.log(at.kappa).sum()))
             bound += (prior.shape + 1.0) * float(np.log(at.alpha / (prior.shape + 1.0)).sum()) + d * prior.constant
         return bound if np.isfinite(bound) else -np.inf
+
+    @property
+    def rounding(self) -> float:
+        """How far the bound can be off: the residual's energy is a difference of energies as large as the output's."""
+        return 4.0 * float(np.finfo(np.float64).eps) * (abs(self.bound) + self.model.normal.yy / self._at.D)
 
     @cached_property
     def gradient(self) -> Array:

@@ -32,7 +32,10 @@ SMALLEST_INPUT_VARIANCE = 1e-15
 
 @dataclass(frozen=True)
 class GammaPrior:
-    """``α_m ~ Gamma(shape, rate)``, the prior of every column's precision; small values say next to nothing.
+    """``α_m ~ Gamma(shape, rate)``, the prior of every column's precision.
+
+    With the default rate the bound, as a function of the shape, is largest between 0.05 and 0.5, on the paper's
+    synthetic problems as on real robots' moments.
 
     Attributes:
         shape: The paper's ``a_α0``.

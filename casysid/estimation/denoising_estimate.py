@@ -18,8 +18,9 @@ import numpy as np
 from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError
 from casysid.estimation.base import Estimate
-from casysid.estimation.denoising import STARTS, DenoisingPosterior, Start, denoise, state_from
+from casysid.estimation.denoising import STARTS, Start, denoise, state_from
 from casysid.estimation.denoising_em import DenoisingModel, GammaPrior, State
+from casysid.estimation.denoising_posterior import DenoisingPosterior
 from casysid.estimation.selection import conditional_covariance
 from casysid.estimation.standardise import (
     NOISE_FLOOR,
