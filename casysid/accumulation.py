@@ -18,6 +18,11 @@ from casysid.errors import ParameterError
 from casysid.moments import Moments
 from casysid.signals.averaging import BandAverage
 
+LARGEST_INVALID_SHARE = 0.01
+"""An average counts for a joint if no more than this share of its weight lies on samples that do not."""
+
+Mask = npt.NDArray[np.bool_]
+
 
 def accumulate_moments(
     regressor: Regressor,
@@ -41,7 +46,8 @@ def accumulate_moments(
         a: Accelerations, shape (N, nv).
         tau: Torques ``y``, shape (N, nv).
         average: Takes averages of the equations instead of the equations themselves, of ``x`` and ``y`` alike.
-        valid: Which samples to use, boolean, shape (N,); None uses all.
+        valid: Which samples to use, boolean: shape (N,) for all joints alike, or (N, nv) for each joint's own row; None
+            uses all. With ``average`` a joint's windows over samples that are not valid for it are left out.
         blocks: How many blocks of near-equal length; fewer when there are fewer samples.
         threads: How many threads to use. The sums do not depend on it.
         progress: Called with the number of samples done and of all.
@@ -52,7 +58,7 @@ def accumulate_moments(
     inputs, samples = regressor.equations.check((q, v, a, tau))
     if any(array.ndim != 2 for array in inputs):
         raise ParameterError(f"moments: q, v, a, tau must be (N, n); got {', '.join(str(x.shape) for x in inputs)}")
-    chosen = _chosen(valid, samples)
+    chosen, own = _chosen(valid, samples, regressor.robot.nv)
     _require_finite(inputs, chosen)
     if blocks < 1:
         raise ParameterError(f"moments: blocks must be at least 1; got {blocks}")
@@ -60,16 +66,21 @@ def accumulate_moments(
     widths = [len(columns) + 1 for columns in regressor.row_columns]
     rows, squares = np.cumsum([0, *widths]), np.cumsum([0, *(width**2 for width in widths)])
 
-    def square(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, int, Array]:
-        packed = np.empty(squares[-1])
+    def square(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, Array, Array]:
+        packed, kept = np.empty(squares[-1]), None if own is None else own[piece]
         if average is not None:
-            values = np.ascontiguousarray((average.weights(piece) @ values.T).T)
+            weights = average.weights(piece)
+            values = np.ascontiguousarray((weights @ values.T).T)
+            kept = None if kept is None else weights @ ~kept <= LARGEST_INVALID_SHARE
+        count = np.full(len(widths), float(values.shape[1])) if kept is None else kept.sum(axis=0, dtype=np.float64)
         for joint, width in enumerate(widths):
             x = values[rows[joint] : rows[joint + 1]]
+            if count[joint] < x.shape[1]:
+                x = x[:, kept[:, joint]]  # type: ignore[index]
             np.matmul(x, x.T, out=packed[squares[joint] : squares[joint + 1]].reshape(width, width))
-        return len(piece), values.shape[1], packed
+        return len(piece), count, packed
 
-    sums, counts, done = np.zeros((len(groups), squares[-1])), np.zeros(len(groups)), 0
+    sums, counts, done = np.zeros((len(groups), squares[-1])), np.zeros((len(groups), len(widths))), 0
     with threadpool_limits(1, user_api="blas"):  # threads of ours beside threads of BLAS would wait for each other
         for block, (count, equations, packed) in regressor.equations.map(square, inputs, groups, threads):
             sums[block] += packed
@@ -88,20 +99,22 @@ def _spread(regressor: Regressor, sums: Array, squares: npt.NDArray[np.intp], co
         places, width = np.append(columns, p), len(columns) + 1
         own = sums[:, squares[joint] : squares[joint + 1]].reshape(-1, width, width)
         gram[:, joint, places[:, None], places] = own
-    return Moments(gram, np.repeat(counts[:, None], regressor.robot.nv, axis=1), regressor.names, regressor.robot.dofs)
+    return Moments(gram, counts, regressor.names, regressor.robot.dofs)
 
 
-def _chosen(valid: npt.ArrayLike | None, samples: int) -> npt.NDArray[np.intp]:
-    """Indices of the samples to use."""
+def _chosen(valid: npt.ArrayLike | None, samples: int, joints: int) -> tuple[npt.NDArray[np.intp], Mask | None]:
+    """Indices of the samples to use, and the mask by joint if there is one."""
     mask = np.ones(samples, dtype=bool) if valid is None else np.asarray(valid)
-    if mask.dtype != np.bool_ or mask.shape != (samples,):
+    if mask.dtype != np.bool_ or mask.shape not in ((samples,), (samples, joints)):
         raise ParameterError(
-            f"moments: valid must be boolean with shape ({samples},); got {mask.dtype} with shape {mask.shape}"
+            f"moments: valid must be boolean with shape ({samples},) or ({samples}, {joints}); got {mask.dtype} with "
+            f"shape {mask.shape}"
         )
-    chosen = np.flatnonzero(mask)
+    own = mask if mask.ndim == 2 else None
+    chosen = np.flatnonzero(mask) if own is None else np.arange(samples if mask.any() else 0)
     if len(chosen) == 0:
         raise ParameterError(f"moments: no sample to sum, {samples} given and {samples} left out")
-    return chosen
+    return chosen, own
 
 
 def _require_finite(inputs: list[Array], chosen: npt.NDArray[np.intp]) -> None:

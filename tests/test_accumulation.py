@@ -10,6 +10,7 @@ from casysid.dynamics import Coupling, build_regressor, bulk, replay
 from casysid.errors import ParameterError
 from casysid.moments import Moments
 from casysid.robot import JointKind
+from casysid.signals import BandAverage
 from tests.strategies import generators, random_motion, random_robot, robots
 
 ROBOT = random_robot(np.random.default_rng(0), [JointKind.REVOLUTE, JointKind.PRISMATIC, JointKind.REVOLUTE])
@@ -89,6 +90,33 @@ def test_samples_that_are_not_valid_are_as_if_never_logged():
     assert_same(accumulate_moments(REGRESSOR, *samples, valid=valid, blocks=4), left)
 
 
+def test_each_joint_sums_its_own_valid_samples():
+    samples = log(ROBOT, 90, np.random.default_rng(9))
+    valid = np.random.default_rng(10).random((90, 3)) > 0.3
+    together = accumulate_moments(REGRESSOR, *samples, valid=valid, blocks=1)
+    for joint in range(3):
+        alone = accumulate_moments(REGRESSOR, *samples, valid=valid[:, joint], blocks=1)
+        scale = np.abs(alone.gram[0, joint]).max()
+        np.testing.assert_allclose(together.gram[0, joint], alone.gram[0, joint], rtol=0, atol=1e-12 * scale)
+        assert together.count[0, joint] == valid[:, joint].sum()
+
+
+def test_averages_over_samples_that_are_not_valid_for_a_joint_leave_the_other_joints_alone():
+    samples, time = log(ROBOT, 400, np.random.default_rng(11)), np.arange(400) * 0.01
+    valid = np.ones((400, 3), dtype=bool)
+    valid[100:200, 1] = False
+    spoilt = samples[3].copy()
+    spoilt[105:195, 1] = 1e6
+    average = BandAverage(time, 5.0)
+    whole, part = (
+        accumulate_moments(REGRESSOR, *samples[:3], tau, average=average, valid=mask, blocks=1)
+        for tau, mask in ((samples[3], None), (spoilt, valid))
+    )
+    np.testing.assert_array_equal(part.gram[0, [0, 2]], whole.gram[0, [0, 2]])
+    assert 0 < part.count[0, 1] < whole.count[0, 1]
+    assert part.gram[0, 1, -1, -1] < whole.gram[0, 1, -1, -1]
+
+
 def test_there_are_never_more_blocks_than_samples():
     samples = log(ROBOT, 3, np.random.default_rng(6))
     moments = accumulate_moments(REGRESSOR, *samples, blocks=20)
@@ -111,6 +139,8 @@ def test_progress_reaches_the_end():
         ({"a": np.full((10, 3), np.inf)}, "a must be finite; 10 samples are not, the first is number 0"),
         ({"valid": np.zeros(10, dtype=bool)}, "no sample to sum, 10 given and 10 left out"),
         ({"valid": np.zeros(10)}, "valid must be boolean"),
+        ({"valid": np.ones((10, 2), dtype=bool)}, r"shape \(10,\) or \(10, 3\); got bool with shape \(10, 2\)"),
+        ({"valid": np.zeros((10, 3), dtype=bool)}, "no sample to sum, 10 given and 10 left out"),
         ({"blocks": 0}, "blocks must be at least 1; got 0"),
     ],
 )

@@ -15,7 +15,7 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.dynamics import Coulomb
 from casysid.estimation import Ridge, cross_validated_energy
-from casysid.identification.problem import USUAL_WIDTH, build_problem
+from casysid.identification.problem import USUAL_WIDTH, Mask, build_problem
 from casysid.identification.settings import Settings
 from casysid.recording import Recording
 from casysid.robot import Robot
@@ -32,14 +32,26 @@ def choose_relative_width(
     recordings: Sequence[Recording],
     cutoff: float | None,
     settings: Settings,
+    moving_only: Mask | bool = False,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Array:
-    """Width of each degree of freedom's smooth sign, in root mean square velocities, shape (nv,)."""
+    """Width of each degree of freedom's smooth sign, in root mean square velocities, shape (nv,).
+
+    Args:
+        robot: The robot.
+        recordings: What is fitted.
+        cutoff: Of the equations [Hz].
+        settings: A width given there is left alone.
+        moving_only: As for :func:`~casysid.identification.problem.build_problem`.
+        progress: Told the share done.
+    """
     if settings.coulomb_width is not None or not any(isinstance(column, Coulomb) for column in settings.friction):
         return np.full(robot.nv, USUAL_WIDTH)
     energy = []
     for k, width in enumerate(RELATIVE_WIDTHS):
-        problem = build_problem(robot, recordings, cutoff, settings, relative_width=width, quick=True)
+        problem = build_problem(
+            robot, recordings, cutoff, settings, relative_width=width, moving_only=moving_only, quick=True
+        )
         energy.append(cross_validated_energy(Ridge(standard_errors=False), problem.moments, problem.regressor.prior))
         progress((k + 1) / len(RELATIVE_WIDTHS))
     error = np.sqrt(energy)  # (widths, nv)

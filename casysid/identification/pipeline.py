@@ -15,9 +15,10 @@ from casysid.identifiability import BaseParameters, excited_base_parameters, str
 from casysid.identification.coulomb import choose_relative_width
 from casysid.identification.cutoff import COARSE_STEP, FINE_STEP, CutoffChoice, choose_cutoff
 from casysid.identification.prediction import torque_error
-from casysid.identification.problem import USUAL_WIDTH, LinearProblem, build_problem, make_motion
+from casysid.identification.problem import USUAL_WIDTH, LinearProblem, Mask, build_problem, make_motion
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
+from casysid.identification.standstill import choose_moving_only
 from casysid.projection import ProjectionResult, build_projection, project
 from casysid.recording import Recording
 from casysid.robot import Robot
@@ -95,10 +96,10 @@ def prepare(
     if not fitted:
         raise RecordingError("identify: at least one recording to fit is needed; got none")
     clock = _Clock()
-    cutoff, width = _settle(robot, fitted, settings, progress)
+    cutoff, width, moving_only = _settle(robot, fitted, settings, progress)
     clock.lap("tuning")
     progress("moments", 0.0)
-    problem = build_problem(robot, fitted, cutoff.cutoff, settings, relative_width=width)
+    problem = build_problem(robot, fitted, cutoff.cutoff, settings, relative_width=width, moving_only=moving_only)
     unseen = tuple(make_motion(robot, recording, cutoff.cutoff) for recording in held_out)
     structural = structural_base_parameters(problem.regressor)
     clock.lap("moments")
@@ -165,9 +166,13 @@ def _project(
 
 def _settle(
     robot: Robot, recordings: Sequence[Recording], settings: Settings, progress: Progress
-) -> tuple[CutoffChoice, Array]:
-    """Cut-off and sharpness of Coulomb friction, each chosen given the other; first roughly, then finely."""
+) -> tuple[CutoffChoice, Array, Mask]:
+    """Cut-off, sharpness of Coulomb friction, whose stands to leave out, each given the others; roughly, then finely.
+
+    The cut-off is chosen with all stands in, so that all candidates are judged by the same equations.
+    """
     width: float | Array = USUAL_WIDTH
+    moving_only = np.zeros(robot.nv, dtype=bool)
     for pace, step in (("rough", COARSE_STEP), ("fine", FINE_STEP)):
         cutoff = choose_cutoff(
             robot,
@@ -177,14 +182,16 @@ def _settle(
             step=step,
             progress=lambda share, pace=pace: progress(f"cut-off, {pace}", share),  # type: ignore[misc]
         )
+        moving_only = choose_moving_only(robot, recordings, cutoff.cutoff, settings, width)
         width = choose_relative_width(
             robot,
             recordings,
             cutoff.cutoff,
             settings,
+            moving_only,
             lambda share, pace=pace: progress(f"friction, {pace}", share),  # type: ignore[misc]
         )
-    return cutoff, np.broadcast_to(width, robot.nv)
+    return cutoff, np.broadcast_to(width, robot.nv), moving_only
 
 
 class _Clock:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
@@ -34,6 +35,8 @@ MINIMUM_BLOCKS = 4
 SAMPLES_PER_PERIOD = 10
 """A decimated motion keeps so many samples in a period of its cut-off."""
 
+Mask = npt.NDArray[np.bool_]
+
 
 @dataclass(frozen=True, eq=False)
 class LinearProblem:
@@ -41,7 +44,7 @@ class LinearProblem:
 
     Attributes:
         regressor: The regressor, its Coulomb width set by the motions' velocity noise.
-        motions: The smoothed recordings.
+        motions: The smoothed recordings, marked as standing where equations are left out.
         moments: Sums over all of them, in blocks of time.
         cutoff: Of the equations' average [Hz]; None when they are taken as they are.
     """
@@ -59,6 +62,7 @@ def build_problem(
     settings: Settings,
     *,
     relative_width: float | Array = USUAL_WIDTH,
+    moving_only: Mask | bool = False,
     quick: bool = False,
 ) -> LinearProblem:
     """Smooth, differentiate, and sum up.
@@ -69,9 +73,12 @@ def build_problem(
         cutoff: Of the low-pass [Hz]; None takes the samples as logged.
         settings: Friction columns, couplings, blocks, threads.
         relative_width: Of Coulomb's smooth sign, in root mean square velocities; one for all or by degree of freedom.
+        moving_only: Whether a degree of freedom's equations are taken only while it moves; one for all or by degree of
+            freedom.
         quick: Decimate, and leave out what noise adds: for trials.
     """
     motions = tuple(make_motion(robot, recording, cutoff, quick=quick) for recording in recordings)
+    motions = tuple(dataclasses.replace(motion, standing=motion.standing & moving_only) for motion in motions)
     width = settings.coulomb_width or tuple(coulomb_width(motions, relative_width).tolist())
     friction = tuple(
         dataclasses.replace(column, width=width) if isinstance(column, Coulomb) else column
@@ -80,7 +87,8 @@ def build_problem(
     regressor = build_regressor(robot, friction=friction, couplings=settings.couplings)
     moments = sum_moments(regressor, motions, cutoff, settings)
     if not (quick or cutoff is None):
-        moments = dataclasses.replace(moments, noise=_noise_moments(regressor, recordings, moments, cutoff, settings))
+        noise = _noise_moments(regressor, recordings, motions, moments, cutoff, settings)
+        moments = dataclasses.replace(moments, noise=noise)
     return LinearProblem(regressor, motions, moments, cutoff)
 
 
@@ -94,7 +102,7 @@ def make_motion(robot: Robot, recording: Recording, cutoff: float | None, *, qui
 
 
 def sum_moments(regressor: Regressor, motions: Sequence[Motion], cutoff: float | None, settings: Settings) -> Moments:
-    """Moments of all motions, their blocks one after the other."""
+    """Moments of all motions, their blocks one after the other, each joint's without its stands."""
     blocks = max(MINIMUM_BLOCKS, -(-settings.blocks // len(motions)))
     parts = [
         accumulate_moments(
@@ -104,6 +112,7 @@ def sum_moments(regressor: Regressor, motions: Sequence[Motion], cutoff: float |
             motion.a,
             motion.tau,
             average=None if cutoff is None else BandAverage(motion.time, cutoff),
+            valid=~motion.standing if motion.standing.any() else None,
             blocks=blocks,
             threads=settings.threads,
         )
@@ -116,20 +125,22 @@ def sum_moments(regressor: Regressor, motions: Sequence[Motion], cutoff: float |
 
 
 def _noise_moments(
-    regressor: Regressor, recordings: Sequence[Recording], here: Moments, cutoff: float, settings: Settings
+    regressor: Regressor,
+    recordings: Sequence[Recording],
+    motions: Sequence[Motion],
+    here: Moments,
+    cutoff: float,
+    settings: Settings,
 ) -> Array:
     """By how much moments grow when the encoders' noise is added once more, shape of ``gram``."""
     grown = []
     for sign in (1.0, -1.0):
-        motions = [
-            make_motion(
-                regressor.robot,
-                disturbed(recording, position_noise(recording.time, recording.position), sign, seed),  # type: ignore[arg-type]
-                cutoff,
-            )
-            for seed, recording in enumerate(recordings)
-        ]
-        grown.append(sum_moments(regressor, motions, cutoff, settings).gram)
+        noisier = []
+        for seed, (recording, motion) in enumerate(zip(recordings, motions, strict=True)):
+            noise = position_noise(recording.time, recording.position)  # type: ignore[arg-type]
+            noisy = make_motion(regressor.robot, disturbed(recording, noise, sign, seed), cutoff)
+            noisier.append(dataclasses.replace(noisy, standing=motion.standing))  # the same equations
+        grown.append(sum_moments(regressor, noisier, cutoff, settings).gram)
     return np.asarray(0.5 * (grown[0] + grown[1]) - here.gram)
 
 

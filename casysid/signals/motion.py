@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.arrays import Array, frozen
 from casysid.errors import RecordingError
@@ -14,6 +16,7 @@ from casysid.robot import Robot
 from casysid.robot.coordinates import configuration_from_channels, state_from_channels
 from casysid.signals.noise import position_noise
 from casysid.signals.smoothing import build_smoother
+from casysid.signals.standstill import standing
 
 MINIMUM_SAMPLES = 8
 LONGEST_RESPONSE = 4096
@@ -31,6 +34,7 @@ class Motion:
         a: Acceleration, shape (N, nv).
         tau: Torque as logged, shape (N, nv).
         velocity_noise: Standard deviation of the noise left in ``v``, shape (nv,); zeros where it cannot be known.
+        standing: Which samples find which degree of freedom standing, shape (N, nv); none where it cannot be known.
         cutoff: Of the low-pass that the positions went through [Hz]; inf when nothing was filtered.
     """
 
@@ -40,11 +44,13 @@ class Motion:
     a: Array
     tau: Array
     velocity_noise: Array
+    standing: npt.NDArray[np.bool_]
     cutoff: float
 
     def __post_init__(self) -> None:
         for name in ("time", "q", "v", "a", "tau", "velocity_noise"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
+        self.standing.setflags(write=False)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -56,8 +62,13 @@ class Motion:
         whole = len(self) // stride * stride
         middle = slice(stride // 2, whole, stride)
         picked = {name: getattr(self, name)[middle] for name in ("time", "q", "v", "a")}
-        tau = self.tau[:whole].reshape(-1, stride, self.tau.shape[1]).mean(axis=1)
-        return Motion(**picked, tau=tau, velocity_noise=self.velocity_noise, cutoff=self.cutoff)
+        parts = (-1, stride, self.tau.shape[1])
+        return dataclasses.replace(
+            self,
+            **picked,
+            tau=self.tau[:whole].reshape(parts).mean(axis=1),
+            standing=np.asarray(self.standing[:whole].reshape(parts).any(axis=1)),
+        )
 
 
 def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | None) -> Motion:
@@ -73,27 +84,33 @@ def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | No
     q, v, a = (np.concatenate([piece[k] for piece in smoothed]) for k in range(3))
     rows = np.concatenate([np.arange(piece.start, piece.stop) for piece in pieces])
     longest = max(pieces, key=lambda piece: piece.stop - piece.start)
+    noise = position_noise(recording.time[longest], recording.position[longest])
     return Motion(
         time=recording.time[rows],
         q=q,
         v=v,
         a=a,
         tau=recording.torque[rows],
-        velocity_noise=_velocity_noise(robot, recording, longest, cutoff),
+        velocity_noise=_velocity_noise(robot, recording.time[longest], noise, cutoff),
+        standing=_standing(robot, recording, pieces, noise, v, cutoff),
         cutoff=cutoff,
     )
 
 
 def low_passed(time: Array, values: Array, cutoff: float) -> Array:
     """Values, shape (N, n), behind the zero-phase low-pass, each stretch between gaps in time by itself."""
-    steps = np.diff(time)
-    gaps = np.flatnonzero(steps > GAP_IN_STEPS * np.median(steps)) + 1
-    pieces = np.split(np.arange(len(time)), gaps)
     smoothed = [
         build_smoother(time[piece], cutoff).smooth(values[piece]) if len(piece) >= MINIMUM_SAMPLES else values[piece]
-        for piece in pieces
+        for piece in stretches(time)
     ]
     return np.concatenate(smoothed)
+
+
+def stretches(time: Array) -> list[npt.NDArray[np.intp]]:
+    """Indices of the samples between gaps in time."""
+    steps = np.diff(time)
+    gaps = np.flatnonzero(steps > GAP_IN_STEPS * np.median(steps)) + 1
+    return np.split(np.arange(len(time)), gaps)
 
 
 def disturbed(recording: Recording, noise_std: Array, sign: float, seed: int) -> Recording:
@@ -116,6 +133,7 @@ def _as_logged(robot: Robot, recording: Recording) -> Motion:
         a=recording.acceleration,
         tau=recording.torque,
         velocity_noise=np.zeros(robot.nv),
+        standing=np.zeros((count, robot.nv), dtype=bool),
         cutoff=np.inf,
     )
 
@@ -126,14 +144,32 @@ def _smooth_piece(robot: Robot, recording: Recording, piece: slice, cutoff: floa
     return state_from_channels(robot, *(smoother.smooth(recording.position[piece], order) for order in range(3)))
 
 
-def _velocity_noise(robot: Robot, recording: Recording, piece: slice, cutoff: float) -> Array:
+def _velocity_noise(robot: Robot, time: Array, channel_noise: Array, cutoff: float) -> Array:
     """Noise of the smoothed velocity of each degree of freedom, for joints with one channel each."""
-    assert recording.time is not None
-    time = recording.time[piece]
     gain = np.sqrt(build_smoother(time[: min(len(time), LONGEST_RESPONSE)], cutoff).noise_covariance()[1, 1])
-    channel_noise = gain * position_noise(time, recording.position[piece])
     noise = np.zeros(robot.nv)
-    for joint in robot.joints:
-        if joint.channels.stop - joint.channels.start == 1:
-            noise[joint.v] = channel_noise[joint.channels]
+    rates, channels = _single_channels(robot)
+    noise[rates] = gain * channel_noise[channels]
     return noise
+
+
+def _standing(
+    robot: Robot, recording: Recording, pieces: Sequence[slice], channel_noise: Array, v: Array, cutoff: float
+) -> npt.NDArray[np.bool_]:
+    """Stands of the joints with one channel each; no window of the search is longer than a period of the cut-off."""
+    rates, channels = _single_channels(robot)
+    speed = np.sqrt(np.mean(v[:, rates] ** 2, axis=0))
+    stands = np.zeros(v.shape, dtype=bool)
+    stands[:, rates] = np.concatenate(
+        [
+            standing(recording.position[piece, channels], recording.rate, channel_noise[channels], speed, 1.0 / cutoff)
+            for piece in pieces
+        ]
+    )
+    return stands
+
+
+def _single_channels(robot: Robot) -> tuple[list[int], list[int]]:
+    """Places in rates and channels of the joints that have one of each."""
+    single = [joint for joint in robot.joints if joint.channels.stop - joint.channels.start == 1]
+    return [joint.v.start for joint in single], [joint.channels.start for joint in single]
