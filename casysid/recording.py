@@ -167,6 +167,10 @@ class Recording:
             )
         return self._selected(slice(first, last))
 
+    def with_time_scaled(self, scale: float) -> Recording:
+        """The recording with its time stamps multiplied; velocities and accelerations stay as logged."""
+        return self if self.time is None else dataclasses.replace(self, time=self.time * scale)
+
     def decimated(self, factor: int) -> Recording:
         """Every ``factor``-th sample, plainly picked.
 

@@ -148,7 +148,11 @@ class Regressor:
 
 
 def build_regressor(
-    robot: Robot, friction: Sequence[FrictionColumn] = DEFAULT_FRICTION, couplings: Sequence[Coupling] = ()
+    robot: Robot,
+    friction: Sequence[FrictionColumn] = DEFAULT_FRICTION,
+    couplings: Sequence[Coupling] = (),
+    *,
+    quasi_static: bool = False,
 ) -> Regressor:
     """The regressor of a robot.
 
@@ -157,6 +161,8 @@ def build_regressor(
         friction: Columns of every driven degree of freedom, and of every coupling as far as they depend on motion
             there (a coupling's constant torque is a sum of its joints' constant torques).
         couplings: Motors that act on several joints.
+        quasi_static: Torques hold gravity and friction, but nothing inertial: for links velocity and acceleration, for
+            drives acceleration count as zero.
 
     Raises:
         ParameterError: When a kind of friction or a coupling is given twice, a coupling names an unknown joint, or a
@@ -166,8 +172,10 @@ def build_regressor(
     if len(set(kinds)) != len(kinds) or len(set(coupled)) != len(coupled):
         raise ParameterError(f"friction: every kind and every coupling once; got {kinds} and {coupled}")
     state = symbolic.State.of(robot)
-    motions = symbolic.link_motions(robot, state)
-    drive = list(_drive_columns(robot, state, friction, couplings))
+    still = ca.SX(robot.nv, 1)
+    motions = symbolic.link_motions(robot, symbolic.State(state.q, still, still) if quasi_static else state)
+    driven = symbolic.State(state.q, state.v, still) if quasi_static else state
+    drive = list(_drive_columns(robot, driven, friction, couplings))
     drive_matrix = ca.horzcat(ca.SX(robot.nv, 0), *(column for _, column in drive))
     parameters = (*_inertial_parameters(robot), *(parameter for parameter, _ in drive))
     rigid = robot.inertial_parameters.size

@@ -76,9 +76,7 @@ def choose_cutoff(
     band = _motion_band(recordings)
     if settings.cutoff is not None:
         return CutoffChoice(settings.cutoff, nothing, nothing, band, "given")
-    candidates = candidate_cutoffs(
-        band, min(recording.rate for recording in recordings), max(recording.duration for recording in recordings), step
-    )
+    candidates = candidate_cutoffs(*_band_rate_duration(recordings), step)
     errors = []
     for k, cutoff in enumerate(candidates):
         errors.append(cutoff_error(robot, recordings, float(cutoff), settings, relative_width))
@@ -104,6 +102,16 @@ def _motion_band(recordings: Sequence[Recording]) -> float:
         if recording.time is not None
     ]
     return float(np.median(bands))
+
+
+def _band_rate_duration(recordings: Sequence[Recording]) -> tuple[float, float, float]:
+    rates, durations = zip(*((recording.rate, recording.duration) for recording in recordings), strict=True)
+    return _motion_band(recordings), min(rates), max(durations)
+
+
+def lowest_cutoff(recordings: Sequence[Recording]) -> float:
+    """The lowest cut-off that keeps the motion [Hz]."""
+    return float(candidate_cutoffs(*_band_rate_duration(recordings))[0])
 
 
 def candidate_cutoffs(band: float, rate: float, duration: float, step: float = FINE_STEP) -> Array:

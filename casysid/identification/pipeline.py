@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from casysid.identification.problem import USUAL_WIDTH, LinearProblem, Mask, bui
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 from casysid.identification.standstill import choose_moving_only
+from casysid.identification.time_base import TimeBase, settle_time_base
 from casysid.projection import ProjectionResult, build_projection, project
 from casysid.recording import Recording
 from casysid.robot import Robot
@@ -41,6 +43,7 @@ class Preparation:
 
     Attributes:
         robot: The robot.
+        time_base: What was found of the recordings' clock.
         cutoff: The low-pass and why.
         problem: Regressor, motions and moments of the fitted recordings.
         held_out: Motions that are only predicted.
@@ -49,6 +52,7 @@ class Preparation:
     """
 
     robot: Robot
+    time_base: TimeBase
     cutoff: CutoffChoice
     problem: LinearProblem
     held_out: tuple[Motion, ...]
@@ -96,15 +100,20 @@ def prepare(
     if not fitted:
         raise RecordingError("identify: at least one recording to fit is needed; got none")
     clock = _Clock()
+    time_base = settle_time_base(robot, fitted, settings)
+    settings = dataclasses.replace(settings, quasi_static=time_base.quasi_static)
+    fitted = tuple(recording.with_time_scaled(time_base.scale) for recording in fitted)
     cutoff, width, moving_only = _settle(robot, fitted, settings, progress)
     clock.lap("tuning")
     progress("moments", 0.0)
     problem = build_problem(robot, fitted, cutoff.cutoff, settings, relative_width=width, moving_only=moving_only)
-    unseen = tuple(make_motion(robot, recording, cutoff.cutoff) for recording in held_out)
+    unseen = tuple(
+        make_motion(robot, recording.with_time_scaled(time_base.scale), cutoff.cutoff) for recording in held_out
+    )
     structural = structural_base_parameters(problem.regressor)
     clock.lap("moments")
     progress("moments", 1.0)
-    return Preparation(robot, cutoff, problem, unseen, structural, clock.laps)
+    return Preparation(robot, time_base, cutoff, problem, unseen, structural, clock.laps)
 
 
 def solve(preparation: Preparation, settings: Settings, *, progress: Progress = silent) -> IdentificationResult:
@@ -123,6 +132,7 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
     result = IdentificationResult(
         robot=preparation.robot,
         settings=settings,
+        time_base=preparation.time_base,
         cutoff=preparation.cutoff,
         regressor=regressor,
         estimate=estimate,

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
-from casysid.dynamics import Coulomb, Regressor, build_regressor
+from casysid.dynamics import Coulomb, FrictionColumn, Regressor, build_regressor
 from casysid.identification.settings import Settings
 from casysid.moments import Moments
 from casysid.recording import Recording
@@ -79,17 +79,26 @@ def build_problem(
     """
     motions = tuple(make_motion(robot, recording, cutoff, quick=quick) for recording in recordings)
     motions = tuple(dataclasses.replace(motion, standing=motion.standing & moving_only) for motion in motions)
-    width = settings.coulomb_width or tuple(coulomb_width(motions, relative_width).tolist())
-    friction = tuple(
-        dataclasses.replace(column, width=width) if isinstance(column, Coulomb) else column
-        for column in settings.friction
+    friction = with_widths(settings, motions, relative_width)
+    regressor = build_regressor(
+        robot, friction=friction, couplings=settings.couplings, quasi_static=bool(settings.quasi_static)
     )
-    regressor = build_regressor(robot, friction=friction, couplings=settings.couplings)
     moments = sum_moments(regressor, motions, cutoff, settings)
     if not (quick or cutoff is None):
         noise = _noise_moments(regressor, recordings, motions, moments, cutoff, settings)
         moments = dataclasses.replace(moments, noise=noise)
     return LinearProblem(regressor, motions, moments, cutoff)
+
+
+def with_widths(
+    settings: Settings, motions: Sequence[Motion], relative_width: float | Array
+) -> tuple[FrictionColumn, ...]:
+    """The friction columns asked for, Coulomb's smooth sign as sharp as the motions allow."""
+    width = settings.coulomb_width or tuple(coulomb_width(motions, relative_width).tolist())
+    return tuple(
+        dataclasses.replace(column, width=width) if isinstance(column, Coulomb) else column
+        for column in settings.friction
+    )
 
 
 def make_motion(robot: Robot, recording: Recording, cutoff: float | None, *, quick: bool = False) -> Motion:

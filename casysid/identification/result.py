@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,6 +17,7 @@ from casysid.identification.cutoff import CutoffChoice
 from casysid.identification.links import LinkProperties, link_properties
 from casysid.identification.prediction import TorqueError
 from casysid.identification.settings import Settings
+from casysid.identification.time_base import TimeBase
 from casysid.inertia import smallest_eigenvalue
 from casysid.projection import ProjectionResult
 from casysid.robot import Robot
@@ -32,6 +34,7 @@ class IdentificationResult:
     Attributes:
         robot: The robot as its file describes it.
         settings: What was asked for.
+        time_base: What was found of the recordings' clock.
         cutoff: The low-pass and why.
         regressor: Of which ``parameters`` are the coefficients.
         estimate: The unconstrained estimate.
@@ -51,6 +54,7 @@ class IdentificationResult:
 
     robot: Robot
     settings: Settings
+    time_base: TimeBase
     cutoff: CutoffChoice
     regressor: Regressor
     estimate: Estimate
@@ -151,6 +155,7 @@ class IdentificationResult:
             "joints": list(by_joint),
             "samples": {"train": self.train.samples, "held_out": held_out.samples if held_out else 0},
             "seconds": round(sum(self.seconds.values()), 3),
+            "time_base": dataclasses.asdict(self.time_base),
             "cutoff": {
                 "hz": self.cutoff.cutoff,
                 "motion_band_hz": self.cutoff.motion_band,

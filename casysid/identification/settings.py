@@ -26,6 +26,8 @@ class Settings:
         coulomb_width: Velocity within which Coulomb's smooth sign turns [rad/s, m/s]; None takes it from the velocity's
             noise.
         couplings: Transmissions that link joints, such as a wrist driven by two motors.
+        time_scale: Time stamps times this are seconds; None looks whether inertial torques contradict the clock.
+        quasi_static: Torques hold no inertial part, gravity and friction explain them; None lets the data decide.
         blocks: Blocks of time by which moments are kept: the folds of cross-validation and the unit of standard errors.
         threads: Threads of the regressor's evaluation.
     """
@@ -37,12 +39,16 @@ class Settings:
     friction: tuple[FrictionColumn, ...] = DEFAULT_FRICTION
     coulomb_width: float | None = None
     couplings: tuple[Coupling, ...] = ()
+    time_scale: float | None = None
+    quasi_static: bool | None = None
     blocks: int = 20
     threads: int = 2
 
     def __post_init__(self) -> None:
         if self.cutoff is not None and not (np.isfinite(self.cutoff) and self.cutoff > 0):
             raise ParameterError(f"cut-off must be a positive number of Hz; got {self.cutoff}")
+        if self.time_scale is not None and not (np.isfinite(self.time_scale) and self.time_scale > 0):
+            raise ParameterError(f"time scale must be a positive number; got {self.time_scale}")
         if self.blocks < 4:
             raise ParameterError(
                 f"blocks must be at least 4 for cross-validation and standard errors; got {self.blocks}"
