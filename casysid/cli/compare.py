@@ -19,6 +19,7 @@ from casysid.cli.options import (
     LogsArgument,
     RobotArgument,
     SplitOption,
+    TimeScaleOption,
     load_recordings,
     load_robot,
     make_settings,
@@ -37,6 +38,7 @@ def compare(
     methods: Annotated[str, typer.Option(help="Names with commas between them, or all.")] = "all",
     consistency: ConsistencyOption = ConsistencyChoice.FULL,
     cutoff: CutoffOption = None,
+    time_scale: TimeScaleOption = None,
     coupling: CouplingOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
@@ -57,7 +59,7 @@ def compare(
 
         names = [kind.name for kind in ESTIMATORS] if methods == "all" else methods.split(",")
         estimators = [estimator_by_name(name) for name in names]
-        settings = make_settings("ridge", consistency, cutoff, coupling)
+        settings = make_settings("ridge", consistency, cutoff, coupling, time_scale)
         model = load_robot(robot, gravity, lock, floating_base)
         fitted, unseen = load_recordings(model, logs, held_out, split)
         with progress_bar(console) as progress:

@@ -20,6 +20,7 @@ from casysid.cli.options import (
     LogsArgument,
     RobotArgument,
     SplitOption,
+    TimeScaleOption,
     load_recordings,
     load_robot,
     make_settings,
@@ -39,6 +40,7 @@ def identify(
     method: Annotated[str, typer.Option(help="Estimator; 'casysid compare' lists them.")] = "ridge",
     consistency: ConsistencyOption = ConsistencyChoice.FULL,
     cutoff: CutoffOption = None,
+    time_scale: TimeScaleOption = None,
     coupling: CouplingOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
@@ -59,7 +61,7 @@ def identify(
         from casysid.identification.output import write_result
         from casysid.report import write_report
 
-        settings = make_settings(method, consistency, cutoff, coupling)
+        settings = make_settings(method, consistency, cutoff, coupling, time_scale)
         model = load_robot(robot, gravity, lock, floating_base)
         fitted, unseen = load_recordings(model, logs, held_out, split)
         with progress_bar(console) as progress:

@@ -33,6 +33,10 @@ SplitOption = Annotated[
 ]
 ConsistencyOption = Annotated[ConsistencyChoice, typer.Option(help="Physical laws that the answer is made to obey.")]
 CutoffOption = Annotated[float | None, typer.Option(help="Low-pass cut-off [Hz]; default: chosen by the data.")]
+TimeScaleOption = Annotated[
+    float | None,
+    typer.Option(help="Time stamps times this are seconds; default: as logged, unless inertial torques contradict it."),
+]
 CouplingOption = Annotated[
     list[str] | None,
     typer.Option(metavar="JOINT+JOINT", help="A motor that turns with the sum of two joints' motions. Repeatable."),
@@ -76,7 +80,11 @@ def load_recordings(
 
 
 def make_settings(
-    method: str, consistency: ConsistencyChoice, cutoff: float | None, couplings: list[str] | None
+    method: str,
+    consistency: ConsistencyChoice,
+    cutoff: float | None,
+    couplings: list[str] | None,
+    time_scale: float | None = None,
 ) -> Settings:
     """Settings from the command line's words."""
     from casysid.dynamics import Coupling
@@ -89,6 +97,7 @@ def make_settings(
         method=estimator_by_name(method),
         consistency=None if consistency is ConsistencyChoice.NONE else Consistency(consistency.value),
         cutoff=cutoff,
+        time_scale=time_scale,
         couplings=tuple(Coupling(joints=joints, weights=(1.0,) * len(joints)) for joints in pairs),
     )
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.errors import RecordingError
+from casysid.errors import CasysidWarning, RecordingError
 from casysid.estimation import Estimate
 from casysid.identifiability import BaseParameters, excited_base_parameters, structural_base_parameters
 from casysid.identification.coulomb import choose_relative_width
@@ -101,6 +102,8 @@ def prepare(
         raise RecordingError("identify: at least one recording to fit is needed; got none")
     clock = _Clock()
     time_base = settle_time_base(robot, fitted, settings)
+    if time_base.reason:
+        warnings.warn(time_base.reason, CasysidWarning, stacklevel=3)
     settings = dataclasses.replace(settings, quasi_static=time_base.quasi_static)
     fitted = tuple(recording.with_time_scaled(time_base.scale) for recording in fitted)
     cutoff, width, moving_only = _settle(robot, fitted, settings, progress)

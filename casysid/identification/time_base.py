@@ -35,6 +35,8 @@ WITNESSES = 2
 """So many joints at least must say the same."""
 WORTHWHILE = 0.5
 """Another clock must bring the energy of the errors held out below this fraction of the logged clock's."""
+SIMPLER = 0.9
+"""And below this fraction of gravity's and friction's alone: no inertia is the simpler reading."""
 CLOCK_TOLERANCE = 0.2
 """Logged velocities within this of the differentiated positions confirm the clock."""
 SCALES = np.geomspace(1e-2, 1e2, 185)
@@ -140,13 +142,16 @@ def clock_is_confirmed(robot: Robot, recording: Recording) -> bool:
 
 def _decide(split: SplitMoments, share: float, *, confirmed: bool) -> TimeBase:
     """The clock that fits best, if it is far better than the one logged on time left out."""
-    candidates = [] if confirmed or share <= 0.0 else [_best_scale(split)]
+    gains = {}
     if share < 1.0:
-        candidates.append(math.inf)
-    gains = [_held_out_gain(split, scale) for scale in candidates]
-    if not gains or min(gains) > WORTHWHILE:
+        gains[math.inf] = _held_out_gain(split, math.inf)
+    if not confirmed and share > 0.0:
+        clock = _best_scale(split)
+        gains[clock] = _held_out_gain(split, clock) / SIMPLER
+    if not gains or min(gains.values()) > WORTHWHILE:
         return TimeBase(inertial_share=share)
-    scale, gain = candidates[int(np.argmin(gains))], math.sqrt(min(gains))
+    scale = min(gains, key=gains.__getitem__)
+    gain = math.sqrt(_held_out_gain(split, scale))
     words = f"inertial torque is {share:.2g} times what the model file promises beside gravity's with this clock"
     if math.isinf(scale):
         reason = f"{words}; the torques are explained by gravity and friction alone (held-out error x {gain:.2f})"

@@ -57,7 +57,9 @@ def _reasons(result: IdentificationResult) -> list[str]:
 
 
 def _remarks(result: IdentificationResult) -> list[str]:
-    remarks = []
+    remarks = (
+        [f"{result.time_base.reason[:1].upper()}{result.time_base.reason[1:]}."] if result.time_base.reason else []
+    )
     if result.held_out is None:
         remarks.append("No recording was held out: the error is that of the fit, and flatters.")
     missing = result.structural.rank - result.excited.rank
