@@ -10,6 +10,7 @@ blocks of time left out. Moments of gravity's and of the inertial columns kept a
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -221,8 +222,8 @@ def _pieces(motion: Motion, motions: int) -> list[npt.NDArray[np.intp]]:
 
 def _start(motion: Motion) -> Motion:
     """At most the first few thousand samples."""
-    kept = {name: getattr(motion, name)[:LONGEST] for name in ("time", "q", "v", "a", "tau")}
-    return Motion(**kept, velocity_noise=motion.velocity_noise, cutoff=motion.cutoff)
+    kept = {name: getattr(motion, name)[:LONGEST] for name in ("time", "q", "v", "a", "tau", "standing")}
+    return dataclasses.replace(motion, **kept)
 
 
 def _solve(gram: Array) -> Array:
