@@ -8,8 +8,11 @@ recordings, processes, machines.
 
 from __future__ import annotations
 
+import os
+import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -146,6 +149,39 @@ class Moments:
     def target_energy(self) -> Array:
         """``Σ y²`` by block and joint, shape (blocks, joints)."""
         return np.asarray(self.gram[:, :, -1, -1])
+
+
+def write_moments(moments: Moments, path: Path) -> None:
+    """Write the sums over all blocks as NPZ: ``gram``, ``count``, ``columns``, ``joints``; noise is left out."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with partial.open("wb") as stream:
+            np.savez_compressed(
+                stream,
+                gram=moments.gram.sum(axis=0, keepdims=True),
+                count=moments.count.sum(axis=0, keepdims=True),
+                columns=np.array(moments.columns),
+                joints=np.array(moments.joints),
+            )
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def read_moments(path: Path) -> Moments:
+    """What :func:`write_moments` wrote, as one block.
+
+    Raises:
+        ParameterError: The file is not there, or is something else.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as content:
+            columns, joints = (tuple(str(name) for name in content[key]) for key in ("columns", "joints"))
+            return Moments(content["gram"], content["count"], columns, joints)
+    except FileNotFoundError as error:
+        raise ParameterError(f"{path}: there is no such file; casysid identify writes it beside result.json") from error
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise ParameterError(f"{path}: these are no moments as casysid identify writes them ({error})") from error
 
 
 def _shift(gram: Array, parameters: Array) -> Array:

@@ -24,7 +24,7 @@ from scipy.optimize import minimize
 from casysid.bundled import find_model
 from casysid.errors import CasysidError, CasysidWarning
 from casysid.excitation import ConditionNumber, FourierSeries, build_excitation, design_excitation
-from casysid.excitation.feasible import TIGHTENING, find_standing, random_start, small_start
+from casysid.excitation.feasible import find_standing, random_start, small_start
 from casysid.excitation.program import Evaluation
 from casysid.excitation.repair import shrunk
 from casysid.excitation.search import STRIDE
@@ -118,7 +118,7 @@ def slsqp(problem, seconds):
     """
     evaluation = Evaluation(problem, problem.blocks, STRIDE)
     standing, rng = find_standing(problem, 0), np.random.default_rng(0)
-    lower, upper = evaluation.bounds(TIGHTENING)
+    lower, upper = evaluation.bounds(problem.tightening)
     finite = np.isfinite(lower), np.isfinite(upper)
     began, best, ends = time.process_time(), (-np.inf, None), 0
 

@@ -14,7 +14,15 @@ from casysid.cli.options import GravityOption, LockOption, RobotArgument, load_r
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from casysid.excitation import Box, ExcitationProblem, FourierSeries, HalfSpace, JointLimits, KeepInBlock
+    from casysid.excitation import (
+        Box,
+        ExcitationDesign,
+        ExcitationProblem,
+        FourierSeries,
+        HalfSpace,
+        JointLimits,
+        KeepInBlock,
+    )
     from casysid.excitation.results import Progress
     from casysid.robot import Robot
 
@@ -22,6 +30,7 @@ if TYPE_CHECKING:
 class CriterionChoice(enum.StrEnum):
     """Words of ``--criterion``."""
 
+    BALANCED = "balanced"
     D = "d"
     CONDITION = "condition"
     TORQUE = "torque"
@@ -32,7 +41,10 @@ def excite(
     log: Annotated[
         list[Path] | None,
         typer.Option(
-            "--log", metavar="LOG", help="An earlier recording: design for what it does not tell. Repeatable."
+            "--log",
+            metavar="LOG",
+            help="An earlier recording, or result.json of an identification: design for what it does not tell. "
+            "Repeatable.",
         ),
     ] = None,
     period: Annotated[float | None, typer.Option(help="Of the motion [s]; default: from the limits.")] = None,
@@ -42,8 +54,11 @@ def excite(
     rate: Annotated[float, typer.Option(help="Samples per second [Hz].")] = 500.0,
     criterion: Annotated[
         CriterionChoice,
-        typer.Option(help="d: confidence volume; condition: condition number; torque: accuracy of predicted torque."),
-    ] = CriterionChoice.D,
+        typer.Option(
+            help="d: confidence volume; condition: condition number; balanced: mostly the first, a little the second; "
+            "torque: accuracy of predicted torque."
+        ),
+    ] = CriterionChoice.BALANCED,
     acceleration: Annotated[float | None, typer.Option(help="Largest acceleration [rad/s², m/s²].")] = None,
     jerk: Annotated[float | None, typer.Option(help="Largest jerk [rad/s³, m/s³].")] = None,
     velocity_share: Annotated[float, typer.Option(help="Share of the velocity limits to use.")] = 0.9,
@@ -105,10 +120,13 @@ def excite(
                 progress("write", 0.0)
                 write_excitation(design, folder)
                 write_excitation_pictures(design, folder)
+            undrawn = _preview(designs, _folders(out, len(designs)))
         for design, folder in zip(designs, _folders(out, len(designs)), strict=True):
             for line in describe(design):
                 console.print(f"  · {line}", markup=False, soft_wrap=True)
             typer.echo(str(folder / "excitation.csv"))
+        if undrawn:
+            console.print(f"  · {undrawn}", markup=False, soft_wrap=True)
     if any(design.status is not DesignStatus.CONVERGED for design in designs):
         sys.exit(SOLVER_FAILED)
 
@@ -164,14 +182,33 @@ def _numbers(option: str, text: str, count: int) -> list[float]:
 
 def _informed(robot: Robot, problem: ExcitationProblem, choice: CriterionChoice, logs: list[Path]) -> ExcitationProblem:
     """The problem with the criterion chosen and what the logs tell."""
-    from casysid.excitation import ConditionNumber, after_recordings, torque_accuracy
+    from casysid.excitation import ConditionNumber, DOptimal, after_recordings, after_result, torque_accuracy
     from casysid.recording import read_recordings
 
     if choice is CriterionChoice.CONDITION:
         problem = problem.judged_by(ConditionNumber())
+    elif choice is CriterionChoice.D:
+        problem = problem.judged_by(DOptimal())
     elif choice is CriterionChoice.TORQUE:
         problem = problem.judged_by(torque_accuracy(problem))
-    return after_recordings(problem, read_recordings(logs, robot)) if logs else problem
+    results = [path for path in logs if path.suffix == ".json" or path.is_dir()]
+    recordings = [path for path in logs if path not in results]
+    for path in results:
+        problem = after_result(problem, path)
+    return after_recordings(problem, read_recordings(recordings, robot)) if recordings else problem
+
+
+def _preview(designs: tuple[ExcitationDesign, ...], folders: list[Path]) -> str:
+    """Draw the robot on its motions; what is in the way of that, if anything."""
+    from casysid.errors import MissingExtraError
+    from casysid.report.excitation_preview import write_excitation_preview
+
+    try:
+        for design, folder in zip(designs, folders, strict=True):
+            write_excitation_preview(design, folder)
+    except MissingExtraError as error:
+        return f"No preview.png: {error}."
+    return ""
 
 
 def _watch(progress: Callable[[str, float], None]) -> Progress:

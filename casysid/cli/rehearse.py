@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -11,11 +12,22 @@ import typer
 from casysid.cli.options import FloatingOption, GravityOption, LockOption, RobotArgument, load_robot
 
 
+class ExcitationChoice(enum.StrEnum):
+    """Words of ``--excitation``."""
+
+    SINUSOIDS = "sinusoids"
+    DESIGNED = "designed"
+
+
 def rehearse(
     robot: RobotArgument,
     seed: Annotated[int, typer.Option(help="Of the hidden truth, the motions and the noise.")] = 0,
     duration: Annotated[float, typer.Option(help="Of the recording to fit, and of the one held out [s].")] = 30.0,
     rate: Annotated[float, typer.Option(help="Of controller and log [Hz].")] = 500.0,
+    excitation: Annotated[
+        ExcitationChoice,
+        typer.Option(help="Of the recording to fit: random sinusoids, or the motions that casysid excite designs."),
+    ] = ExcitationChoice.SINUSOIDS,
     method: Annotated[str | None, typer.Option(help="Estimator, as in casysid identify.")] = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
@@ -33,11 +45,17 @@ def rehearse(
         from casysid.report import write_report
         from casysid.report.rehearsal_pictures import write_rehearsal_pictures
         from casysid.report.validation_tables import rehearsal_tables
-        from casysid.validation import RehearsalSettings, write_rehearsal
+        from casysid.validation import Excitation, RehearsalSettings, write_rehearsal
         from casysid.validation import rehearse as run
 
         identification = Settings(method=estimator_by_name(method)) if method else Settings()
-        settings = RehearsalSettings(duration=duration, rate=rate, seed=seed, identification=identification)
+        settings = RehearsalSettings(
+            duration=duration,
+            rate=rate,
+            seed=seed,
+            excitation=Excitation(excitation.value),
+            identification=identification,
+        )
         model = load_robot(robot, gravity, lock, floating_base)
         with progress_bar(console) as progress:
             rehearsal = run(model, settings, progress)

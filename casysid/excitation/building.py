@@ -14,7 +14,7 @@ from casysid.excitation.blocks import Block, TorqueBlock, joint_block
 from casysid.excitation.capsules import Capsule, capsules_of
 from casysid.excitation.cartesian_blocks import ClearanceBlock, KeepInBlock
 from casysid.excitation.clearance import Obstacle, build_clearance
-from casysid.excitation.criteria import Criterion, DOptimal
+from casysid.excitation.criteria import Balanced, Criterion
 from casysid.excitation.information import Information, column_scale
 from casysid.excitation.kinematics import Kinematics
 from casysid.excitation.limits import JointLimits, limits_of
@@ -61,7 +61,7 @@ def build_excitation(
         periods: How often the period is repeated.
         rate: Samples per second of the recording [Hz].
         limits: None takes the model file's, with a margin (:func:`limits_of`).
-        criterion: None is D-optimality.
+        criterion: None is D-optimality with an eye to the condition number (:class:`Balanced`).
         friction: Columns to be identified beside the inertial ones; None is viscous, Coulomb (with a smooth width that
             fits the velocity), offset and armature.
         parameters: Of the prior model for the torque, shape (p,); None takes the model file's.
@@ -96,7 +96,7 @@ def build_excitation(
         parameters=theta,
         information=information,
         known=frozen(np.zeros((information.size, information.size))),
-        criterion=criterion or DOptimal(),
+        criterion=criterion or Balanced(),
         blocks=(*_joint_blocks(regressor, limits, theta), *distances, *keep_in),
         samples=samples,
         start=_start(robot, limits, start),

@@ -52,6 +52,8 @@ def design_set(
 ) -> tuple[ExcitationDesign, ...]:
     """Several motions that complement each other: each is designed knowing what those before it tell.
 
+    All start, and end, where the first one does, so they can be played one after another.
+
     Raises:
         ParameterError: ``count`` is not positive, or no motion keeps the limits.
     """
@@ -63,5 +65,5 @@ def design_set(
         designs.append(design)
         if design.status is DesignStatus.INTERRUPTED:
             break
-        problem = problem.knowing(design.gained)
+        problem = problem.knowing(design.gained).starting_at(design.trajectory.start)
     return tuple(designs)

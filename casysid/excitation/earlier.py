@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
 from casysid.errors import ParameterError
 from casysid.excitation.problem import ExcitationProblem
+from casysid.moments import read_moments
 from casysid.recording import Recording
 from casysid.signals import motion_band, motion_from_recording
 
@@ -35,6 +38,41 @@ def after_recordings(
     if not recordings:
         raise ParameterError("excitation: wanted at least one earlier recording; got none")
     return problem.knowing_gram(sum((_gram(problem, one, cutoff) for one in recordings), 0.0))
+
+
+def after_result(problem: ExcitationProblem, path: str | Path) -> ExcitationProblem:
+    """The same problem, knowing what an identification's recordings tell under the problem's torque noise.
+
+    Args:
+        problem: Whose noise is used; its columns have to be those of the identification.
+        path: ``result.json`` as ``casysid identify`` writes it, with ``moments.npz`` beside it; or their folder.
+
+    Raises:
+        ParameterError: A file is missing or is something else, or the columns are not the same.
+    """
+    place = Path(path)
+    place = place / "result.json" if place.is_dir() else place
+    moments, regressor = read_moments(place.with_name("moments.npz")), problem.information.regressor
+    if set(moments.columns) != set(regressor.names) or moments.joints != regressor.robot.dofs:
+        differing = sorted(set(moments.columns) ^ set(regressor.names))
+        raise ParameterError(
+            f"excitation: {place.parent} is of other joints or columns than this design; wanted the same, got "
+            f"differences in {', '.join(differing[:6]) or 'joints'}. Take the robot and the friction columns that were "
+            "identified"
+        )
+    samples = _samples(place)
+    averaged = samples / np.maximum(moments.count.sum(axis=0), 1.0)  # samples that went into a row
+    order = [moments.columns.index(name) for name in regressor.names]
+    gram = moments.pooled(averaged * problem.information.noise_std**-2.0).xx
+    return problem.knowing_gram(gram[np.ix_(order, order)])
+
+
+def _samples(path: Path) -> float:
+    """How many were fitted."""
+    try:
+        return float(json.loads(path.read_text(encoding="utf-8"))["samples"]["train"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ParameterError(f"{path}: this is no result.json as casysid identify writes it ({error})") from error
 
 
 def _gram(problem: ExcitationProblem, recording: Recording, cutoff: float | None) -> Array:

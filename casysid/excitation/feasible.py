@@ -16,8 +16,6 @@ from casysid.excitation.verification import verify
 
 STANDING = 1500
 """Random configurations in which standing is tried."""
-TIGHTENING = 0.006
-"""How far, as a share of each limit, the optimiser stays within it, for what happens between instants of its grid."""
 SMALL = 0.05
 """Amplitude of the trajectory that is feasible for certain, as a share of half the range."""
 _HALVINGS = 7
@@ -44,7 +42,7 @@ def find_standing(problem: ExcitationProblem, seed: int) -> Standing:
         candidates = np.vstack([limits.middle, limits.middle + 0.9 * spread * limits.half_range])
     still = np.zeros_like(candidates)
     motion = Motion(candidates, still, still, still)
-    share = np.min([_room(block, motion) for block in problem.blocks], axis=0)
+    share = np.min([_room(block, motion, problem.tightening) for block in problem.blocks], axis=0)
     feasible = share > 0.0
     if not feasible.any():
         raise _refusal(problem, candidates[int(np.argmax(share))])
@@ -54,14 +52,14 @@ def find_standing(problem: ExcitationProblem, seed: int) -> Standing:
     return Standing(candidates[order])
 
 
-def _room(block: Block, motion: Motion) -> Array:
+def _room(block: Block, motion: Motion, tightening: float) -> Array:
     """Least slack at each instant as a share of the scale, of the constraint itself and of what the optimiser sees."""
     if not block.labels:
         return np.full(len(motion.position), np.inf)
     lower, upper = block.bounds
     seen = block.constrain(motion)
     smooth = np.minimum(seen - lower, upper - seen).min(axis=1)
-    return np.asarray(np.minimum(smooth - TIGHTENING, (block.slack(motion) / block.scale).min(axis=1)))
+    return np.asarray(np.minimum(smooth - tightening, (block.slack(motion) / block.scale).min(axis=1)))
 
 
 def _refusal(problem: ExcitationProblem, position: Array) -> ParameterError:
@@ -119,7 +117,7 @@ def random_start(
     place = standing.positions[0 if fixed else rng.integers(min(len(standing.positions), 30))]
     shape = rng.normal(size=(n, size)) / np.tile(np.arange(1, problem.series.harmonics), 2) ** rng.uniform(0.0, 1.0)
     shape *= _joint_scales(problem, place, shape, fixed)[:, None] * rng.uniform(0.6, 1.0, (n, 1))
-    lower, upper = evaluation.bounds(TIGHTENING)
+    lower, upper = evaluation.bounds(problem.tightening)
     resting = swing(problem, place, 0.0 * shape, fixed)
     whole = swing(problem, place, shape, fixed) - resting
     low, high = 0.0, 1.0

@@ -20,6 +20,9 @@ from casysid.robot import Robot
 
 REFINEMENT = 10
 """The check looks at so many times as many instants as the design."""
+TIGHTENING = {False: 0.006, True: 0.003}
+"""How far, as a share of each limit, the optimiser stays within it, for what happens between instants of its grid; less
+from a start that is given, which may be where another design started."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -61,6 +64,11 @@ class ExcitationProblem:
         """Samples in the whole recording."""
         return self.rate * self.series.period * self.periods
 
+    @property
+    def tightening(self) -> float:
+        """See :data:`TIGHTENING`."""
+        return TIGHTENING[self.start is not None]
+
     def variables(self, trajectory: ExcitationTrajectory) -> Array:
         """The design's variables of a trajectory, shape (n (1 + series.size),)."""
         values = np.column_stack([trajectory.start, trajectory.coordinates])
@@ -82,6 +90,10 @@ class ExcitationProblem:
     def judged_by(self, criterion: Criterion) -> ExcitationProblem:
         """The same with another criterion."""
         return dataclasses.replace(self, criterion=criterion)
+
+    def starting_at(self, position: Array) -> ExcitationProblem:
+        """The same from given positions, shape (n,)."""
+        return dataclasses.replace(self, start=frozen(position))
 
     def knowing(self, information: Array) -> ExcitationProblem:
         """The same with more information beforehand, shape (r, r), scaled, as :meth:`gained` returns it."""

@@ -11,8 +11,8 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.excitation.blocks import Block, TorqueBlock
-from casysid.excitation.criteria import DOptimal
-from casysid.excitation.feasible import TIGHTENING, Standing, find_standing, random_start, small_start
+from casysid.excitation.criteria import Balanced, DOptimal
+from casysid.excitation.feasible import Standing, find_standing, random_start, small_start
 from casysid.excitation.problem import ExcitationProblem
 from casysid.excitation.program import Evaluation, Program
 from casysid.excitation.repair import shrunk, violated_instants
@@ -103,7 +103,7 @@ class Search:
 
     def _prepared(self, x: Array, blocks: Sequence[Block]) -> Array:
         """The safe motion; for criteria that are hard to climb from there, first the D-optimal motion near it."""
-        if isinstance(self.problem.criterion, DOptimal):
+        if isinstance(self.problem.criterion, (DOptimal, Balanced)):
             return x
         easier = self.problem.judged_by(DOptimal())
         program = Program(self._evaluation(easier, blocks, STRIDE), self._preparing)
@@ -186,7 +186,7 @@ class Search:
             self.stopped = self.stopped or self._tell(number, iteration, best.objective)
             return self._over()
 
-        sides, limits = _bounds(self.problem), program.evaluation.bounds(TIGHTENING)
+        sides, limits = _bounds(self.problem), program.evaluation.bounds(self.problem.tightening)
         try:
             solution = solve_nlp(
                 program.nlp,

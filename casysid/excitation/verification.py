@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.arrays import Array
-from casysid.excitation.blocks import Block
+from casysid.excitation.blocks import Block, JointBlock, TorqueBlock
 from casysid.excitation.problem import REFINEMENT, ExcitationProblem
 from casysid.excitation.series import ExcitationTrajectory, Motion
 
@@ -91,19 +94,54 @@ def verify(problem: ExcitationProblem, trajectory: ExcitationTrajectory, samples
         samples: Instants to look at; None is ten times those of the design grid.
     """
     count = REFINEMENT * problem.samples if samples is None else samples
-    time = problem.series.grid(count)
+    pieces = ((t, trajectory.motion(t)) for t in _pieces(problem.series.grid(count)))
+    margins = _worst(problem.blocks, ((t, _measuring(motion)) for t, motion in pieces))
+    return Verification(samples=count, margins=margins)
+
+
+def verify_recorded(problem: ExcitationProblem, time: Array, motion: Motion, torque: Array) -> Verification:
+    """The least margin of every quantity but jerk over a motion that took place, from the torque that acted.
+
+    Args:
+        problem: Whose limits are to be kept.
+        time: Instants, shape (N,), [s].
+        motion: The joints' motion then; its jerk is not looked at.
+        torque: Of the joints, shape (N, n), [N m, N].
+    """
+    blocks = tuple(one for one in problem.blocks if not (isinstance(one, JointBlock) and one.order > 2))
+    rows = _pieces(np.arange(len(time)))
+    chosen = ((time[k], Motion(*(values[k] for values in motion)), torque[k]) for k in rows)
+    margins = _worst(blocks, ((t, _measuring(piece, acted)) for t, piece, acted in chosen))
+    return Verification(samples=len(time), margins=margins)
+
+
+Measure = Callable[[Block], Array]
+
+
+def _pieces(values: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
+    return np.array_split(values, -(-len(values) // CHUNK))
+
+
+def _measuring(motion: Motion, torque: Array | None = None) -> Measure:
+    def measure(block: Block) -> Array:
+        if torque is not None and isinstance(block, TorqueBlock):
+            return torque[:, block.joints]
+        return block.measure(motion)
+
+    return measure
+
+
+def _worst(blocks: Sequence[Block], pieces: Iterable[tuple[Array, Measure]]) -> tuple[Margin, ...]:
     worst: dict[tuple[int, int], Margin] = {}
-    for piece in np.array_split(time, -(-count // CHUNK)):
-        motion = trajectory.motion(piece)
-        for b, block in enumerate(problem.blocks):
-            for k, margin in enumerate(_least(block, motion, piece)):
+    for time, measure in pieces:
+        for b, block in enumerate(blocks):
+            for k, margin in enumerate(_least(block, measure(block), time)):
                 if (b, k) not in worst or margin.slack < worst[b, k].slack:
                     worst[b, k] = margin
-    return Verification(samples=count, margins=tuple(worst[key] for key in sorted(worst)))
+    return tuple(worst[key] for key in sorted(worst))
 
 
-def _least(block: Block, motion: Motion, time: Array) -> list[Margin]:
-    values = block.measure(motion)
+def _least(block: Block, values: Array, time: Array) -> list[Margin]:
     slack = np.minimum(values - block.lower, block.upper - values)
     slack = np.where(np.isnan(slack), -np.inf, slack)
     rows = slack.argmin(axis=0)

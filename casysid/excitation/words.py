@@ -101,11 +101,5 @@ def _unknown(design: ExcitationDesign) -> list[str]:
     return lines
 
 
-def _group_of(kind: str) -> str:
-    if kind.startswith("mc"):
-        return "first moment"
-    return "mass" if kind == "m" else "inertia" if kind.startswith("I") else kind
-
-
 def _std(information: Array, floor: float) -> Array:
     return np.sqrt(np.diag(np.linalg.inv(information + floor * np.eye(len(information)))))

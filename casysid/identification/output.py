@@ -1,4 +1,4 @@
-"""A result on disk: ``result.json`` and the identified model, each whole or not at all."""
+"""A result on disk: ``result.json``, the identified model and the moments, each whole or not at all."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from pathlib import Path
 
 from casysid.identification.result import IdentificationResult, without_infinities
 from casysid.identification.verdict import judge
+from casysid.moments import write_moments
 from casysid.robot import write_robot
 
 
 def write_result(
     result: IdentificationResult, directory: Path, *, export_inconsistent: bool = False
 ) -> tuple[str, ...]:
-    """Write ``result.json`` and ``identified.urdf`` or ``identified.xml`` into a directory, made if needed.
+    """Write ``result.json``, ``moments.npz``, and ``identified.urdf`` or ``identified.xml`` into a directory.
 
     Returns:
         What a person should know about the written model, one sentence each.
@@ -27,6 +28,7 @@ def write_result(
         "verdict": {"accepted": verdict.accepted, "reasons": list(verdict.reasons), "remarks": list(verdict.remarks)},
         "model_notes": list(notes),
     }
+    write_moments(result.moments, directory / "moments.npz")
     write_json(content, directory / "result.json")
     return notes
 

@@ -138,6 +138,7 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
         time_base=preparation.time_base,
         cutoff=preparation.cutoff,
         regressor=regressor,
+        moments=problem.moments,
         estimate=estimate,
         projection=projection,
         uncertainty=uncertainty,

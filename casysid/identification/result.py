@@ -19,6 +19,7 @@ from casysid.identification.prediction import TorqueError
 from casysid.identification.settings import Settings
 from casysid.identification.time_base import TimeBase
 from casysid.inertia import smallest_eigenvalue
+from casysid.moments import Moments
 from casysid.projection import ProjectionResult
 from casysid.robot import Robot
 from casysid.signals import Motion
@@ -37,6 +38,7 @@ class IdentificationResult:
         time_base: What was found of the recordings' clock.
         cutoff: The low-pass and why.
         regressor: Of which ``parameters`` are the coefficients.
+        moments: Of the fitted recordings.
         estimate: The unconstrained estimate.
         projection: How the estimate was made consistent; None when that was not asked for.
         uncertainty: Standard errors of the answer.
@@ -57,6 +59,7 @@ class IdentificationResult:
     time_base: TimeBase
     cutoff: CutoffChoice
     regressor: Regressor
+    moments: Moments
     estimate: Estimate
     projection: ProjectionResult | None
     uncertainty: ParameterUncertainty

@@ -31,6 +31,16 @@ def figure(width: float, height: float, rows: int = 1) -> tuple[Any, Any]:
     return canvas, axes
 
 
+def figure_grid(width: float, height: float, columns: int) -> tuple[Any, Any]:
+    """A figure of its own with ``columns`` bare axes beside each other."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    canvas = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(canvas)
+    return canvas, canvas.subplots(1, columns, squeeze=False)[0]
+
+
 def torque_figure(result: IdentificationResult) -> Any:
     """Measured and predicted torque of each joint over the first held-out motion, or the first fitted one."""
     error = result.held_out or result.train

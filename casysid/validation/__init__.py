@@ -1,7 +1,9 @@
 """How good parameters are: on recordings, in a controller, and against a hidden truth."""
 
+from casysid.validation.exciting import Excitation
 from casysid.validation.output import write_rehearsal
 from casysid.validation.perturbation import hidden_truth
+from casysid.validation.playback import DesignedMotion, Playback, play
 from casysid.validation.prediction import Validation, read_drives, validate
 from casysid.validation.rehearsal import Rehearsal, RehearsalSettings, rehearse
 from casysid.validation.tracking import Tracking, measure_tracking, track
@@ -9,6 +11,9 @@ from casysid.validation.truth import BaseComparison, compare_base_parameters, tr
 
 __all__ = [
     "BaseComparison",
+    "DesignedMotion",
+    "Excitation",
+    "Playback",
     "Rehearsal",
     "RehearsalSettings",
     "Tracking",
@@ -16,6 +21,7 @@ __all__ = [
     "compare_base_parameters",
     "hidden_truth",
     "measure_tracking",
+    "play",
     "read_drives",
     "rehearse",
     "track",

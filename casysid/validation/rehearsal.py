@@ -21,8 +21,8 @@ from casysid.simulation import (
     Plant,
     PlantSettings,
     SimulatedRun,
-    design_sinusoids,
 )
+from casysid.validation.exciting import Excitation, excite
 from casysid.validation.perturbation import hidden_truth
 from casysid.validation.tracking import Tracking, measure_tracking, track
 from casysid.validation.truth import (
@@ -49,6 +49,7 @@ class RehearsalSettings:
         duration: Of the recording to fit, and of the one held out [s].
         rate: Of controller and log [Hz].
         seed: Of the hidden truth, the motions and the sensors' noise.
+        excitation: What moves the machine while the recording to fit is made; the one held out has sinusoids always.
         inertia_spread: How far links differ from the file: see :func:`casysid.validation.hidden_truth`.
         friction_spread: How far friction and armature do.
         plant: What the machine does beside rigid-body dynamics, and its sensors.
@@ -60,6 +61,7 @@ class RehearsalSettings:
     duration: float = 30.0
     rate: float = 500.0
     seed: int = 0
+    excitation: Excitation = Excitation.SINUSOIDS
     inertia_spread: float = 0.1
     friction_spread: float = 0.3
     plant: PlantSettings = field(default_factory=PlantSettings)
@@ -108,6 +110,7 @@ class Rehearsal:
         return {
             "robot": self.plant.robot.name,
             "seed": self.settings.seed,
+            "excitation": self.settings.excitation.value,
             "duration": self.settings.duration,
             "rate": self.settings.rate,
             "method": result.estimate.method,
@@ -183,18 +186,23 @@ class _Drill:
 
     def record(self, model: ControlModel, number: int, stage: str) -> SimulatedRun:
         """A motion to fit or to predict."""
-        return self._run(model, number, stage, self.settings.duration, self.settings.recording_bandwidth)
+        settings = self.settings
+        kind = settings.excitation if number == 0 else Excitation.SINUSOIDS
+        return self._run(model, number, stage, settings.duration, settings.recording_bandwidth, kind)
 
     def track(self, model: ControlModel, stage: str) -> SimulatedRun:
         """The motion on which models are compared."""
-        return self._run(model, 2, stage, min(self.settings.duration, LONGEST_TRACKING), self.settings.bandwidth)
+        duration = min(self.settings.duration, LONGEST_TRACKING)
+        return self._run(model, 2, stage, duration, self.settings.bandwidth, Excitation.SINUSOIDS)
 
-    def _run(self, model: ControlModel, number: int, stage: str, duration: float, bandwidth: float) -> SimulatedRun:
+    def _run(
+        self, model: ControlModel, number: int, stage: str, duration: float, bandwidth: float, kind: Excitation
+    ) -> SimulatedRun:
         self.progress(stage, 0.0)
-        plant, seed = self.plant, 3 * self.settings.seed + number
-        motion = design_sinusoids(plant.robot, duration=duration, seed=seed)
+        plant, seed, rate = self.plant, 3 * self.settings.seed + number, self.settings.rate
+        motion = excite(plant.robot, kind, duration=duration, rate=rate, seed=seed)
         gains = PD.tuned(plant.robot, plant.parameters, bandwidth=bandwidth)
-        run = track(plant, model, gains, motion, rate=self.settings.rate, duration=duration, seed=seed)
+        run = track(plant, model, gains, motion, rate=rate, duration=duration, seed=seed)
         self.progress(stage, 1.0)
         return run
 
