@@ -175,12 +175,12 @@ def read_moments(path: Path) -> Moments:
         ParameterError: The file is not there, or is something else.
     """
     try:
-        with np.load(path, allow_pickle=False) as content:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
             columns, joints = (tuple(str(name) for name in content[key]) for key in ("columns", "joints"))
             return Moments(content["gram"], content["count"], columns, joints)
     except FileNotFoundError as error:
         raise ParameterError(f"{path}: there is no such file; casysid identify writes it beside result.json") from error
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise ParameterError(f"{path}: these are no moments as casysid identify writes them ({error})") from error
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from casysid.errors import ParameterError
-from casysid.moments import Moments
+from casysid.moments import Moments, read_moments, write_moments
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -85,3 +85,22 @@ def test_only_like_moments_add():
     x, y = draw_rows(0)
     with pytest.raises(ParameterError, match="same columns and joints"):
         Moments.from_rows(x, y) + Moments.from_rows(x[:, :3], y)
+
+
+def test_moments_on_disk_are_read_back_as_one_block(tmp_path):
+    rng = np.random.default_rng(3)
+    moments = Moments.from_rows(rng.normal(size=(50, 3)), rng.normal(size=50), columns=("a", "b", "c"), blocks=4)
+    write_moments(moments, tmp_path / "moments.npz")
+    back = read_moments(tmp_path / "moments.npz")
+    assert (back.columns, back.joints, back.blocks) == (moments.columns, moments.joints, 1)
+    np.testing.assert_allclose(back.pooled().xx, moments.pooled().xx)
+    assert back.pooled().count == moments.pooled().count
+    assert [path.name for path in tmp_path.iterdir()] == ["moments.npz"]
+
+
+@pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04 cut off"])
+def test_what_is_no_moments_file_is_refused(tmp_path, content):
+    path = tmp_path / "moments.npz"
+    path.write_bytes(content)
+    with pytest.raises(ParameterError, match=r"moments\.npz: these are no moments"):
+        read_moments(path)

@@ -87,8 +87,8 @@ class Search:
         drawn = self._draw(standing, every) if self.starts > 1 else []
         blocks = self._watched([safe, *drawn])
         program = Program(self._evaluation(self.problem, blocks, STRIDE), self.settings)
-        for k, x in enumerate([self._prepared(safe, blocks), *drawn[: self.starts - 1]]):
-            self._solve(program, k + 1, x)
+        for k, x in enumerate([safe, *drawn[: self.starts - 1]]):
+            self._solve(program, k + 1, self._prepared(k + 1, x, blocks))
         extra = np.empty(0)
         for _ in range(REPAIRS):
             best = min(self.found, key=lambda one: one.objective)
@@ -101,15 +101,18 @@ class Search:
             evaluation = self._evaluation(self.problem, self._watched([safe, *drawn], checked), 1, extra)
             self._solve(Program(evaluation, self._repairing), self.starts + 1, best.variables)
 
-    def _prepared(self, x: Array, blocks: Sequence[Block]) -> Array:
-        """The safe motion; for criteria that are hard to climb from there, first the D-optimal motion near it."""
+    def _prepared(self, number: int, x: Array, blocks: Sequence[Block]) -> Array:
+        """The start; for a criterion that is hard to climb from there, first the balanced motion near it."""
         if isinstance(self.problem.criterion, (DOptimal, Balanced)):
             return x
-        easier = self.problem.judged_by(DOptimal())
+        easier = self.problem.judged_by(Balanced())
         program = Program(self._evaluation(easier, blocks, STRIDE), self._preparing)
-        best, solution = self._run(program, 1, x)
+        best, solution = self._run(program, number, x)
         if solution is None:
             raise KeyboardInterrupt
+        if np.isfinite(best.objective):
+            every = self._evaluation(self.problem, blocks, STRIDE)
+            self.found.append(Found(every.objective(best.variables), best.variables, False))
         return best.variables
 
     @property

@@ -3,9 +3,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from casysid.excitation.criteria import AOptimal, ConditionNumber, DOptimal
+from casysid.errors import ParameterError
+from casysid.excitation.criteria import AOptimal, Balanced, ConditionNumber, DOptimal
 
-CRITERIA = [DOptimal(), ConditionNumber(), ConditionNumber(power=2.0), AOptimal(np.diag([1.0, 0.0, 2.0, 0.5]))]
+CRITERIA = [
+    DOptimal(),
+    ConditionNumber(),
+    ConditionNumber(power=2.0),
+    AOptimal(np.diag([1.0, 0.0, 2.0, 0.5])),
+    Balanced(),
+]
 
 
 def information(rng):
@@ -43,6 +50,15 @@ def test_the_smooth_condition_number_bounds_the_true_one_and_approaches_it(seed)
     values = [ConditionNumber(power=p, weight=1.0).evaluate(F)[0] for p in (2.0, 8.0, 64.0)]
     assert values[0] >= values[1] >= values[2] >= true - 1e-9
     assert values[2] <= true + 2 * np.log(4.0) / 64.0
+
+
+@pytest.mark.parametrize("weight", [0.0, 1.0, 10.0])
+def test_the_balanced_criterion_is_the_volume_and_a_share_of_the_condition_number(weight):
+    F = information(np.random.default_rng(0))
+    wanted = -np.linalg.slogdet(F)[1] + weight * np.log(np.linalg.cond(F))
+    assert Balanced(weight, power=400.0).evaluate(F)[0] == pytest.approx(wanted, abs=0.02 * weight + 1e-9)
+    with pytest.raises(ParameterError, match="weight must be a number from 0 up"):
+        Balanced(-1.0)
 
 
 @pytest.mark.parametrize("criterion", CRITERIA, ids=repr)

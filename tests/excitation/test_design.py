@@ -6,14 +6,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from casysid.accumulation import accumulate_moments
 from casysid.bundled import find_model
 from casysid.errors import ParameterError, SolverError
 from casysid.excitation import (
     ConditionNumber,
     DesignStatus,
+    DOptimal,
     FourierSeries,
     HalfSpace,
     after_recordings,
+    after_result,
     build_excitation,
     describe,
     design_excitation,
@@ -25,9 +28,11 @@ from casysid.excitation import (
 )
 from casysid.excitation.output import sample_recording
 from casysid.excitation.words import expected_std
+from casysid.moments import Moments, write_moments
 from casysid.recording import read_recording
 from casysid.report.excitation_pictures import write_excitation_pictures
 from casysid.robot import JointKind, Robot
+from casysid.signals import motion_from_recording
 from tests.strategies import random_robot
 
 SERIES = FourierSeries(5.0, 3)
@@ -99,8 +104,10 @@ def test_acceleration_and_jerk_are_kept_where_given(two_link):
 
 def test_each_criterion_is_best_at_what_it_looks_at(problem, design):
     conditioned = design_excitation(problem.judged_by(ConditionNumber()), starts=2)
-    assert conditioned.condition_number < design.condition_number
-    assert design.log_det > conditioned.log_det
+    largest = design_excitation(problem.judged_by(DOptimal()), starts=2)
+    assert conditioned.condition_number < design.condition_number < largest.condition_number
+    assert largest.log_det > conditioned.log_det
+    assert largest.log_det - 0.1 * problem.information.size < design.log_det < largest.log_det + 0.1
     criterion = torque_accuracy(problem)
     accurate = design_excitation(problem.judged_by(criterion), starts=2)
     assert criterion.evaluate(accurate.information)[0] <= criterion.evaluate(design.information)[0] + 0.02
@@ -113,6 +120,7 @@ def test_a_set_complements_itself(problem):
     np.testing.assert_allclose(second.problem.known, first.gained)
     doubled = np.linalg.slogdet(2.0 * first.gained)[1]
     assert second.log_det >= doubled - 0.5
+    np.testing.assert_array_equal(second.trajectory.start, first.trajectory.start)
     np.testing.assert_allclose(second.information, first.gained + second.gained)
 
 
@@ -125,6 +133,32 @@ def test_earlier_recordings_count_as_what_they_tell(problem, design):
         after_recordings(problem, [])
     with pytest.raises(ParameterError, match="known information must be finite and of shape"):
         problem.knowing_gram(np.eye(3))
+
+
+def test_an_identification_counts_as_what_its_recordings_tell(problem, design, tmp_path):
+    recording, regressor = sample_recording(design, problem.rate), problem.information.regressor
+    motion = motion_from_recording(problem.robot, recording, 20.0)
+    moments = accumulate_moments(regressor, motion.q, motion.v, motion.a, motion.tau, blocks=3)
+    halved = dataclasses.replace(moments, gram=moments.gram / 2.0, count=moments.count / 2.0)  # pairs averaged
+    write_moments(halved, tmp_path / "moments.npz")
+    (tmp_path / "result.json").write_text(json.dumps({"samples": {"train": len(recording)}}))
+    wanted = after_recordings(problem, [recording], cutoff=20.0).known
+    for path in (tmp_path, tmp_path / "result.json"):
+        np.testing.assert_allclose(after_result(problem, path).known, wanted, rtol=1e-9, atol=1e-9 * wanted.max())
+
+
+def test_another_robots_identification_is_refused(problem, tmp_path):
+    with pytest.raises(ParameterError, match=r"moments\.npz: there is no such file"):
+        after_result(problem, tmp_path)
+    regressor = problem.information.regressor
+    sums = np.zeros((1, problem.robot.nv, len(regressor.names) + 1, len(regressor.names) + 1))
+    write_moments(Moments(sums, sums[:, :, 0, 0], regressor.names, ("left", "right")), tmp_path / "moments.npz")
+    with pytest.raises(ParameterError, match="other joints or columns"):
+        after_result(problem, tmp_path)
+    write_moments(Moments(sums, sums[:, :, 0, 0], regressor.names, problem.robot.dofs), tmp_path / "moments.npz")
+    (tmp_path / "result.json").write_text("{}")
+    with pytest.raises(ParameterError, match=r"no result\.json as casysid identify writes it"):
+        after_result(problem, tmp_path)
 
 
 @pytest.mark.parametrize("interrupt", [False, True])

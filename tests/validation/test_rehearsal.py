@@ -8,12 +8,13 @@ import pytest
 
 from casysid.bundled import find_model
 from casysid.errors import ParameterError
+from casysid.excitation import after_result, build_excitation
 from casysid.identification import Settings
 from casysid.report.rehearsal_pictures import write_rehearsal_pictures
 from casysid.report.validation_tables import rehearsal_tables
 from casysid.robot import Robot
 from casysid.simulation import IDEAL
-from casysid.validation import RehearsalSettings, rehearse, true_coefficients, write_rehearsal
+from casysid.validation import Excitation, RehearsalSettings, rehearse, true_coefficients, write_rehearsal
 
 
 @pytest.fixture(scope="module")
@@ -56,11 +57,20 @@ def test_a_rehearsal_on_disk_is_whole(rehearsal, tmp_path):
     assert len(content["base_parameters"]["combinations"]) == rehearsal.result.structural.rank
     assert (tmp_path / "identified.urdf").exists()
     assert (tmp_path / "result.json").exists()
+    known = after_result(build_excitation(rehearsal.plant.robot), tmp_path).known
+    assert np.linalg.eigvalsh(known)[0] > 0.0
     assert len(pictures) == 3
     for path in pictures:
         assert path.read_bytes().startswith(b"\x89PNG")
     assert not list(tmp_path.glob("*.part"))
     assert all(table.rows for _, table in rehearsal_tables(rehearsal))
+
+
+def test_a_designed_motion_tells_more_than_sinusoids(rehearsal):
+    settings = dataclasses.replace(rehearsal.settings, excitation=Excitation.DESIGNED)
+    designed = rehearse(rehearsal.plant.robot, settings)
+    assert np.exp(np.mean(np.log(designed.base.std / rehearsal.base.std))) < 0.7
+    np.testing.assert_array_equal(designed.held_out.reference.q, rehearsal.held_out.reference.q)
 
 
 def test_an_ideal_machine_is_found_closely():
