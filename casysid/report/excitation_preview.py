@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.arrays import Array
 from casysid.excitation import Box, ExcitationDesign, capsules_of
@@ -24,7 +25,7 @@ def write_excitation_preview(design: ExcitationDesign, directory: str | Path) ->
     Raises:
         MissingExtraError: This machine cannot draw; the message says what it lacks.
     """
-    time = np.arange(INSTANTS) * (design.problem.series.period / INSTANTS)
+    time = design.problem.series.grid(INSTANTS)
     pictures = _pictures(design, time)
     canvas, axes = figure_grid(1.5 * INSTANTS, 1.75, INSTANTS)
     for ax, picture, t in zip(axes, pictures, time, strict=True):
@@ -39,7 +40,7 @@ def write_excitation_preview(design: ExcitationDesign, directory: str | Path) ->
     return folder / "preview.png"
 
 
-def _pictures(design: ExcitationDesign, time: Array) -> Array:
+def _pictures(design: ExcitationDesign, time: Array) -> npt.NDArray[np.uint8]:
     problem = design.problem
     blocks = [block for block in problem.blocks if isinstance(block, ClearanceBlock)]
     capsules = blocks[0].every.capsules if blocks else capsules_of(problem.robot)
