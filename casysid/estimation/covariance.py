@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.special import digamma, polygamma
 
 from casysid.arrays import Array
@@ -23,8 +24,14 @@ from casysid.moments import Moments
 
 RANK_TOLERANCE = 1e-9
 """Eigenvalues of the information, scaled to unit diagonal, below this fraction of the largest are no knowledge."""
+ENERGY_TOLERANCE = 1e-24
+"""A column with less than this fraction of the strongest column's energy is zero."""
+CLEARLY_OFF = 3.0
+"""Least squares shows a direction of the prior to be off when it is at least so many of its standard errors away."""
 HEAVIEST_BLOCK = 0.9
 """A direction of which one block holds more than this share says nothing of its own spread from block to block."""
+ROUNDING = 1e-14
+"""Variances of the prior below this fraction of the largest are rounding."""
 PRIOR_STEPS = 50
 """Of the expectation-maximisation that finds how far off the prior is."""
 MOST_POOLED = 2.0
@@ -39,49 +46,74 @@ def block_covariance(moments: Moments, parameters: Array, weights: Array) -> Arr
     return covariance_from_blocks(moments, parameters, weights).marked
 
 
-def covariance_from_blocks(moments: Moments, parameters: Array, weights: Array, pull: Array | None = None) -> Spread:
-    """Covariance of least squares, or of ridge with the error that its pull to the prior brings.
+def covariance_from_blocks(moments: Moments, parameters: Array, weights: Array, prior: Array | None = None) -> Spread:
+    """Covariance of least squares, or of a ridge with the error that its pull to the prior brings.
 
-    Ridge's pull stands for a Gaussian prior of the parameters, whose variance is estimated together with the rest: to
-    the noise comes the error of what is pulled, ``C = (H + P)⁻¹ (M + τ² P) (H + P)⁻¹``. With ``τ²`` the variance of the
-    noise this would be the posterior covariance; it is more where the prior is farther off than the strength says, in
-    all directions together or, as far as least squares shows it, in one.
+    Ridge's pull stands for a Gaussian prior of the parameters, of known shape and unknown size, which is estimated
+    together with the rest: to the noise ``M`` of least squares comes the error of what is pulled. In directions of unit
+    information that the prior holds with variances ``q``, ``C = (1 + 1/q)⁻¹ (M + τ²/q) (1 + 1/q)⁻¹``. With ``τ²`` the
+    variance of the noise this would be the posterior covariance; it is more where the prior is farther off than its
+    strength says, in all directions together or, as far as least squares shows it beyond its noise, in one.
 
     Args:
-        moments: The fitted moments, relative to the prior if there is a pull.
+        moments: The fitted moments, relative to the prior if there is one.
         parameters: ``θ``, shape (p,).
         weights: Row weights by joint, shape (joints,).
-        pull: ``P``, shape (p, p): what a ridge adds to the weighted ``S_xx``; None for none.
+        prior: The ridge's, ``K``: the inverse of what it adds to the weighted ``S_xx``, (p, p); None for none.
 
     Source: the cluster-robust sandwich (Liang and Zeger 1986) with the bias correction of Bell and McCaffrey (2002),
     moderated as in Smyth (2004).
     """
-    H = moments.pooled(weights).xx
-    energy = np.diag(H)
-    live = energy > 0.0
+    normal = moments.pooled(weights)
+    energy = np.diag(normal.xx)
+    live = energy > ENERGY_TOLERANCE * energy.max(initial=0.0)
     inverse = np.where(live, 1.0 / np.sqrt(np.where(live, energy, 1.0)), 0.0)
-    values, vectors = np.linalg.eigh(H * np.outer(inverse, inverse))
+    values, vectors = np.linalg.eigh(normal.xx * np.outer(inverse, inverse))
     known = values > RANK_TOLERANCE * max(values.max(initial=0.0), np.finfo(np.float64).tiny)
     W = inverse[:, None] * vectors[:, known] / np.sqrt(values[known])  # (p, r)
     scores = _scores_of(moments, parameters, weights, W)
     M, freedom = _covariance_of_scores(moments, scores, parameters, weights)
     scale = np.where(live, inverse, inverse.max(initial=0.0) or 1.0)
-    solution = W.T @ moments.pooled(weights).xy
-    return Spread(W @ _pulled(M, solution, W, pull) @ W.T, vectors[:, ~known], scale, freedom)
+    if prior is None or not known.any():
+        covariance = W @ M @ W.T
+    else:
+        sight = np.where(live, np.sqrt(energy), 0.0)[:, None] * vectors[:, known] * np.sqrt(values[known])  # H W
+        covariance = _pulled(M, W.T @ normal.xy, sight, prior)
+    return Spread(covariance, vectors[:, ~known], scale, freedom)
 
 
-def _pulled(meat: Array, solution: Array, W: Array, pull: Array | None) -> Array:
-    """``(1 + P)⁻¹ (M + τ² P) (1 + P)⁻¹`` in directions of unit information, where least squares is at ``solution``."""
-    if pull is None or not len(meat):
-        return meat
-    P = W.T @ pull @ W
-    strength, vectors = np.linalg.eigh(0.5 * (P + P.T))
-    strength = np.maximum(strength, 0.0)
-    off = vectors.T @ solution
-    spread = _prior_variance(strength, off, float(np.trace(meat)) / len(meat))
-    error = np.maximum(spread * strength, (strength * off) ** 2)
-    shrink = vectors / (1.0 + strength)
-    return np.asarray(shrink @ (vectors.T @ meat @ vectors + np.diag(error)) @ shrink.T)
+def _pulled(meat: Array, solution: Array, sight: Array, prior: Array) -> Array:
+    """The mean square error of a ridge, shape (p, p); what the data do not see moves along as the prior lets it.
+
+    Args:
+        meat: ``M``, in directions of unit information, shape (r, r).
+        solution: Least squares in them, relative to the prior, shape (r,).
+        sight: Their gradients ``H W``, shape (p, r).
+        prior: ``K``, shape (p, p).
+    """
+    size, vectors = np.linalg.eigh(sight.T @ prior @ sight)
+    q = np.maximum(size, max(ROUNDING * size.max(initial=0.0), np.finfo(np.float64).tiny))
+    noise, off = vectors.T @ meat @ vectors, vectors.T @ solution
+    variance = _prior_variance(1.0 / q, off, float(np.trace(meat)) / len(meat))
+    error = np.where(_shown_off(off, np.diag(noise), variance * q), np.maximum(off**2 / q, variance), variance)
+    shrunk = prior @ sight @ vectors / (1.0 + q)
+    held = shrunk / np.sqrt(q)
+    return np.asarray(shrunk @ noise @ shrunk.T + (held * error) @ held.T)
+
+
+def _shown_off(off: Array, noise: Array, expected: Array) -> npt.NDArray[np.bool_]:
+    """Where a prior that is off by as much as least squares says is likelier than a prior that is right, and noise.
+
+    The prior's tails are taken for those of Cauchy's distribution: the farther off, the clearer it has to be shown.
+
+    Args:
+        off: Least squares, relative to the prior, shape (r,).
+        noise: Its variance, shape (r,).
+        expected: Variance of the prior, shape (r,).
+    """
+    clear = off**2 / np.maximum(noise, np.finfo(np.float64).tiny)
+    doubt = 2.0 * np.log(np.maximum(clear * np.sqrt(noise / expected), 1.0))
+    return np.asarray(clear > np.maximum(CLEARLY_OFF**2, doubt))
 
 
 def _prior_variance(strength: Array, solution: Array, noise: float) -> float:

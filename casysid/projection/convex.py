@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy import sparse
 
 from casysid.arrays import Array, frozen
@@ -51,13 +52,28 @@ class Cone:
         """Whether ``φ``, shape (p,), is feasible."""
         slack = self.offset - self.matrix @ scaled
         linear = self.equalities + self.inequalities
-        matrices = np.zeros((self.bodies, self.order, self.order))
-        column, row = np.tril_indices(self.order)
-        triangles = slack[linear:].reshape(self.bodies, len(row))
-        matrices[:, column, row] = triangles / np.where(row == column, 1.0, np.sqrt(2.0))
-        smallest = np.linalg.eigvalsh(matrices).min(initial=np.inf)  # reads the lower triangle
+        smallest = np.linalg.eigvalsh(self.matrices(scaled)).min(initial=np.inf)
         worst = min(smallest, slack[self.equalities : linear].min(initial=np.inf))
         return bool(worst >= -tolerance and np.abs(slack[: self.equalities]).max(initial=0.0) <= tolerance)
+
+    def matrices(self, scaled: Array) -> Array:
+        """What must be positive semidefinite at ``φ``, lower triangles, shape (bodies, order, order)."""
+        linear = self.equalities + self.inequalities
+        column, row = np.tril_indices(self.order)
+        triangles = (self.offset[linear:] - self.matrix[linear:] @ scaled).reshape(self.bodies, len(row))
+        matrices = np.zeros((self.bodies, self.order, self.order))
+        matrices[:, column, row] = triangles / np.where(row == column, 1.0, np.sqrt(2.0))
+        return matrices
+
+    def gradients(self, body: npt.NDArray[np.intp], v: Array) -> Array:
+        """Derivatives by ``φ`` of ``vᵀ M v``, ``M`` a body's matrix, shape (k, p), for ``v`` of shape (k, order)."""
+        column, row = np.tril_indices(self.order)
+        weights = v[:, column] * v[:, row] * np.where(row == column, 1.0, np.sqrt(2.0))
+        linear, entries = self.equalities + self.inequalities, len(row)
+        places = linear + body[:, None] * entries + np.arange(entries)
+        rows = np.repeat(np.arange(len(body)), entries)
+        pick = sparse.csr_matrix((weights.ravel(), (rows, places.ravel())), shape=(len(body), self.matrix.shape[0]))
+        return np.asarray(-(pick @ self.matrix).toarray())
 
 
 def cone_of(layout: Layout, constraints: Constraints, frame: Frame, consistency: Consistency, floor: float) -> Cone:

@@ -1,9 +1,7 @@
 """Coordinates in which the prior's links are bodies of about unit size.
 
-Links differ by orders of magnitude, and so do a link's mass and inertia. With a reference pseudo-inertia ``A Aᵀ`` near
-the prior's, ``P = A P' Aᵀ`` turns a link into one of about unit size, whatever the robot, its frames and its units.
-Distance to the prior is measured there, ``‖P' - P'_prior‖`` (Frobenius): the constant pull-back of the affine-invariant
-metric (Lee and Park 2018), which does not depend on the choice of link frames.
+With the prior's links as references (:mod:`casysid.inertia.reference`) a link is one of about unit size. Distance to
+the prior is measured there, ``‖P' - P'_prior‖`` (Frobenius), the constant pull-back of the affine-invariant metric.
 """
 
 from __future__ import annotations
@@ -17,13 +15,17 @@ from scipy.linalg import block_diag
 from casysid.arrays import Array, frozen
 from casysid.errors import CasysidWarning
 from casysid.inertia import (
-    CONSISTENCY_BASIS,
+    ROUNDED,
     Consistency,
+    ball_factor,
+    congruence,
+    frobenius_factor,
     is_consistent,
-    mass_properties,
+    nearest_consistent,
     parameters_from_pseudo_inertia,
     parameters_from_virtual,
-    pseudo_inertia,
+    reference_factor,
+    reference_sizes,
     smallest_eigenvalue,
     virtual_from_parameters,
 )
@@ -33,18 +35,8 @@ from casysid.projection.misfit import DataMisfit
 
 BALL = 0.1
 """Share of a ball of the link's mass and size in its reference, so that flat links do not divide by zero."""
-LIGHTEST = 1e-2
-"""A link's reference mass is at least this fraction of the robot's mean."""
-SMALLEST = 0.1
-"""A link's reference radius of gyration is at least this fraction of the robot's median."""
 LOUDEST = 100.0
 """Effects of a single parameter are not believed to exceed the residuals by more than this factor."""
-NEGLIGIBLE = 1e-12, 1e-6
-"""Masses [kg] and radii of gyration [m] below these are rounding and say nothing."""
-NOTHING_KNOWN = (1.0, 0.1)
-"""Reference mass [kg] and radius of gyration [m] where the prior is empty."""
-ROUNDED = 1e-6
-"""Relative eigenvalues this far below zero are the model file's decimals, and no reason for a warning."""
 UNIT_BODY = frozen(parameters_from_pseudo_inertia(np.eye(4)))
 """Parameters of the body whose pseudo-inertia is the unit matrix."""
 
@@ -75,13 +67,13 @@ def frame_of(
 ) -> Frame:
     """Coordinates and a consistent prior; warns when the prior had to be changed for that."""
     bodies = _nearest_consistent(layout, constraints, prior, consistency)
-    factors = [_reference(*row, consistency) for row in zip(bodies, *_sizes(bodies), strict=True)]
-    blocks = [_congruence(factor) for factor in factors]
+    factors = [_reference(*row, consistency) for row in zip(bodies, *reference_sizes(bodies), strict=True)]
+    blocks = [congruence(factor) for factor in factors]
     scalars = _scales(misfit, prior)[layout.inertial :]
     transform = block_diag(*blocks, np.diag(scalars))
     scaled = np.linalg.solve(transform, np.concatenate([bodies.ravel(), prior[layout.inertial :]]))
     scaled = np.where(constraints.kept, scaled, feasible(layout, scaled, consistency, floor))
-    strain = block_diag(*[_frobenius()] * len(blocks), np.eye(len(scalars)))
+    strain = block_diag(*[frobenius_factor()] * len(blocks), np.eye(len(scalars)))
     return Frame(transform, np.where(constraints.kept, prior, transform @ scaled), scaled, strain)
 
 
@@ -125,50 +117,14 @@ def _nearest_consistent(layout: Layout, constraints: Constraints, prior: Array, 
             CasysidWarning,
             stacklevel=5,
         )
-    scale = np.array([_congruence(_ball(body, *size)) for body, *size in zip(bodies, *_sizes(bodies), strict=True)])
-    unit = np.linalg.solve(scale, bodies[..., None])[..., 0] if len(bodies) else bodies
-    mended = np.einsum("nij,nj->ni", scale, _without_negatives(unit)) if len(bodies) else bodies
-    return np.where(is_consistent(bodies, consistency)[:, None], bodies, mended)
-
-
-def _sizes(bodies: Array) -> tuple[Array, Array]:
-    """Reference mass and radius of gyration of each link, (n,) and (n,), none of them zero."""
-    mass = np.where(bodies[:, 0] > NEGLIGIBLE[0], bodies[:, 0], 0.0)
-    spread = np.trace(mass_properties(bodies).inertia, axis1=1, axis2=2) / 6.0  # tr Σ / 3 about the centre of mass
-    square = np.divide(spread, mass, out=np.zeros_like(mass), where=(mass > 0.0) & (spread > 0.0))
-    mean_mass = np.mean(mass) if mass.any() else NOTHING_KNOWN[0]
-    radius = np.where(square > NEGLIGIBLE[1] ** 2, np.sqrt(square), 0.0)
-    median_radius = np.median(radius[radius > 0.0]) if radius.any() else NOTHING_KNOWN[1]
-    return np.maximum(mass, LIGHTEST * mean_mass), np.maximum(radius, SMALLEST * median_radius)
-
-
-def _ball(body: Array, mass: float, radius: float) -> Array:
-    """``A`` of a ball of the given mass and radius of gyration at the body's centre of mass, if that means anything."""
-    A = np.diag([radius, radius, radius, 1.0])
-    if body[0] > LIGHTEST * mass and is_consistent(body, Consistency.INERTIA, tolerance=ROUNDED):
-        A[:3, 3] = mass_properties(body).center_of_mass
-    return np.asarray(np.sqrt(mass) * A)
+    return nearest_consistent(bodies, consistency)
 
 
 def _reference(body: Array, mass: float, radius: float, consistency: Consistency) -> Array:
     """``A`` of the link's reference: the prior's and some of a ball, or a ball alone where shears are not allowed."""
-    ball = _ball(body, mass, radius)
     if consistency is not Consistency.FULL:
-        return ball
-    reference = pseudo_inertia(body) + BALL * ball @ ball.T
-    return np.asarray(np.linalg.cholesky(reference[::-1, ::-1])[::-1, ::-1])  # upper triangular
-
-
-def _congruence(factor: Array) -> Array:
-    """``T`` of ``P = A P' Aᵀ`` on parameters, shape (10, 10)."""
-    return parameters_from_pseudo_inertia(factor @ CONSISTENCY_BASIS[Consistency.FULL] @ factor.T).T
-
-
-def _frobenius() -> Array:
-    """``F``: ``‖F φ‖`` is the Frobenius norm of the pseudo-inertia of ``φ``, shape (10, 10)."""
-    row, column = np.triu_indices(4)
-    weight = np.where(row == column, 1.0, np.sqrt(2.0))
-    return np.asarray(CONSISTENCY_BASIS[Consistency.FULL][:, row, column] * weight).T
+        return ball_factor(body, mass, radius)
+    return reference_factor(body, mass, radius, BALL)
 
 
 def _scales(misfit: DataMisfit, prior: Array) -> Array:
