@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.arrays import Array, frozen
 from casysid.errors import CasysidWarning, ParameterError, RecordingError
@@ -40,6 +41,8 @@ class Recording:
         time: Strictly increasing, shape (N,), [s]; None for unordered samples.
         velocity: As logged, shape (N, dofs), [rad/s, m/s]; None when not logged.
         acceleration: As logged, shape (N, dofs), [rad/s², m/s²]; None when not logged.
+        torque_delay: By how much the torque's time stamps are late against the positions' [s]; motion is taken so much
+            earlier (:func:`casysid.signals.motion_from_recording`). Not written to files.
         sources: Files it came from.
         unused_columns: Columns of those files that were left aside.
 
@@ -55,6 +58,7 @@ class Recording:
     time: Array | None = field(default=None, repr=False)
     velocity: Array | None = field(default=None, repr=False)
     acceleration: Array | None = field(default=None, repr=False)
+    torque_delay: float = 0.0
     sources: tuple[str, ...] = ()
     unused_columns: tuple[str, ...] = field(default=(), repr=False)
 
@@ -125,7 +129,8 @@ class Recording:
         steps = self._steps
         return steps > GAP * np.median(steps) if len(steps) else np.zeros(0, dtype=np.bool_)
 
-    def _selected(self, rows: slice) -> Recording:
+    def selected(self, rows: slice | npt.NDArray[np.intp]) -> Recording:
+        """Some samples only, in the order of time."""
         return dataclasses.replace(
             self,
             position=self.position[rows],
@@ -148,7 +153,7 @@ class Recording:
             cut = int(np.searchsorted(self.time, self.time[0] + fraction * self.duration))
         if cut in (0, len(self)):
             raise ParameterError(f"split: fraction {fraction} of {len(self)} samples leaves one side empty")
-        return self._selected(slice(None, cut)), self._selected(slice(cut, None))
+        return self.selected(slice(None, cut)), self.selected(slice(cut, None))
 
     def trimmed(self, start: float | None = None, stop: float | None = None) -> Recording:
         """The samples with ``start <= time < stop`` [s], in the recording's own clock; None leaves that end open.
@@ -165,11 +170,13 @@ class Recording:
                 f"{self.label}: no samples from {start} s to {stop} s; "
                 f"the recording runs from {self.time[0]:.6g} s to {self.time[-1]:.6g} s"
             )
-        return self._selected(slice(first, last))
+        return self.selected(slice(first, last))
 
     def with_time_scaled(self, scale: float) -> Recording:
         """The recording with its time stamps multiplied; velocities and accelerations stay as logged."""
-        return self if self.time is None else dataclasses.replace(self, time=self.time * scale)
+        if self.time is None:
+            return self
+        return dataclasses.replace(self, time=self.time * scale, torque_delay=self.torque_delay * scale)
 
     def decimated(self, factor: int) -> Recording:
         """Every ``factor``-th sample, plainly picked.
@@ -181,7 +188,7 @@ class Recording:
         """
         if factor != int(factor) or factor < 1:
             raise ParameterError(f"decimated: factor must be a positive whole number; got {factor}")
-        return self._selected(slice(None, None, int(factor)))
+        return self.selected(slice(None, None, int(factor)))
 
     def summary(self) -> RecordingSummary:
         """What there is, in figures."""

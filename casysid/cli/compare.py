@@ -12,6 +12,7 @@ from casysid.cli.options import (
     ConsistencyOption,
     CouplingOption,
     CutoffOption,
+    DelayOption,
     FloatingOption,
     GravityOption,
     HeldOutOption,
@@ -39,6 +40,7 @@ def compare(
     consistency: ConsistencyOption = ConsistencyChoice.FULL,
     cutoff: CutoffOption = None,
     time_scale: TimeScaleOption = None,
+    delay: DelayOption = "auto",
     coupling: CouplingOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
@@ -59,7 +61,7 @@ def compare(
 
         names = [kind.name for kind in ESTIMATORS] if methods == "all" else methods.split(",")
         estimators = [estimator_by_name(name) for name in names]
-        settings = make_settings("ridge", consistency, cutoff, coupling, time_scale)
+        settings = make_settings("ridge", consistency, cutoff, coupling, time_scale, delay)
         model = load_robot(robot, gravity, lock, floating_base)
         fitted, unseen = load_recordings(model, logs, held_out, split)
         with progress_bar(console) as progress:
@@ -67,6 +69,7 @@ def compare(
             comparison = run(preparation, estimators, settings, progress=progress)
         table = comparison_table(comparison)
         Console().print(rich_table("Torque error, best first", table.header, table.rows))
+        console.print(f"torque delay: {preparation.delay.reason}", markup=False, soft_wrap=True)
         for name, reason in comparison.failures.items():
             console.print(f"{name} failed: {reason}", markup=False, soft_wrap=True)
         if out is not None:

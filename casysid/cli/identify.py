@@ -13,6 +13,7 @@ from casysid.cli.options import (
     ConsistencyOption,
     CouplingOption,
     CutoffOption,
+    DelayOption,
     FloatingOption,
     GravityOption,
     HeldOutOption,
@@ -41,6 +42,7 @@ def identify(
     consistency: ConsistencyOption = ConsistencyChoice.FULL,
     cutoff: CutoffOption = None,
     time_scale: TimeScaleOption = None,
+    delay: DelayOption = "auto",
     coupling: CouplingOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
@@ -61,7 +63,7 @@ def identify(
         from casysid.identification.output import write_result
         from casysid.report import write_report
 
-        settings = make_settings(method, consistency, cutoff, coupling, time_scale)
+        settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay)
         model = load_robot(robot, gravity, lock, floating_base)
         fitted, unseen = load_recordings(model, logs, held_out, split)
         with progress_bar(console) as progress:
@@ -87,6 +89,7 @@ def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...
     ):
         console.print(rich_table(title, table.header, table.rows))
         console.print()
+    console.print(f"torque delay: {result.delay.reason}", markup=False, soft_wrap=True)
     verdict = judge(result)
     console.print(f"[bold {'green' if verdict.accepted else 'red'}]{verdict.headline}[/]")
     for line in (*verdict.reasons, *verdict.remarks, *notes):

@@ -37,6 +37,12 @@ TimeScaleOption = Annotated[
     float | None,
     typer.Option(help="Time stamps times this are seconds; default: as logged, unless inertial torques contradict it."),
 ]
+DelayOption = Annotated[
+    str,
+    typer.Option(
+        metavar="auto|SECONDS", help="How late the torque's time stamps are; auto: found in the data. 0 for none."
+    ),
+]
 CouplingOption = Annotated[
     list[str] | None,
     typer.Option(metavar="JOINT+JOINT", help="A motor that turns with the sum of two joints' motions. Repeatable."),
@@ -85,6 +91,7 @@ def make_settings(
     cutoff: float | None,
     couplings: list[str] | None,
     time_scale: float | None = None,
+    delay: str = "auto",
 ) -> Settings:
     """Settings from the command line's words."""
     from casysid.dynamics import Coupling
@@ -98,8 +105,18 @@ def make_settings(
         consistency=None if consistency is ConsistencyChoice.NONE else Consistency(consistency.value),
         cutoff=cutoff,
         time_scale=time_scale,
+        delay=_seconds(delay),
         couplings=tuple(Coupling(joints=joints, weights=(1.0,) * len(joints)) for joints in pairs),
     )
+
+
+def _seconds(delay: str) -> float | None:
+    from casysid.errors import ParameterError
+
+    try:
+        return None if delay == "auto" else float(delay)
+    except ValueError as error:
+        raise ParameterError(f"--delay wants auto or a number of seconds, such as 0.005; got {delay!r}") from error
 
 
 def _locked(pairs: list[str]) -> dict[str, float]:

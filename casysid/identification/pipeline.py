@@ -16,6 +16,7 @@ from casysid.estimation import Estimate
 from casysid.identifiability import BaseParameters, excited_base_parameters, structural_base_parameters
 from casysid.identification.coulomb import choose_relative_width
 from casysid.identification.cutoff import COARSE_STEP, FINE_STEP, CutoffChoice, choose_cutoff
+from casysid.identification.delay import DelayChoice, choose_delay, given_delay
 from casysid.identification.prediction import torque_error
 from casysid.identification.problem import USUAL_WIDTH, LinearProblem, Mask, build_problem, make_motion
 from casysid.identification.result import IdentificationResult
@@ -25,7 +26,7 @@ from casysid.identification.time_base import TimeBase, settle_time_base
 from casysid.projection import ProjectionResult, build_projection, project
 from casysid.recording import Recording
 from casysid.robot import Robot
-from casysid.signals import Motion
+from casysid.signals import Motion, aligned
 from casysid.uncertainty import ParameterUncertainty, propagate
 
 PRIOR_BUDGET = 0.03
@@ -46,6 +47,7 @@ class Preparation:
         robot: The robot.
         time_base: What was found of the recordings' clock.
         cutoff: The low-pass and why.
+        delay: How late the torque is, and what was taken out of all recordings.
         problem: Regressor, motions and moments of the fitted recordings.
         held_out: Motions that are only predicted.
         structural: Base parameters of the mechanism.
@@ -55,6 +57,7 @@ class Preparation:
     robot: Robot
     time_base: TimeBase
     cutoff: CutoffChoice
+    delay: DelayChoice
     problem: LinearProblem
     held_out: tuple[Motion, ...]
     structural: BaseParameters
@@ -96,7 +99,7 @@ def prepare(
     held_out: Sequence[Recording] = (),
     progress: Progress = silent,
 ) -> Preparation:
-    """Settle cut-off and friction's sharpness, and take the moments; arguments as in :func:`identify`."""
+    """Settle cut-off, delay and friction's sharpness, and take the moments; arguments as in :func:`identify`."""
     fitted = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     if not fitted:
         raise RecordingError("identify: at least one recording to fit is needed; got none")
@@ -106,17 +109,17 @@ def prepare(
         warnings.warn(time_base.reason, CasysidWarning, stacklevel=3)
     settings = dataclasses.replace(settings, quasi_static=time_base.quasi_static)
     fitted = tuple(recording.with_time_scaled(time_base.scale) for recording in fitted)
-    cutoff, width, moving_only = _settle(robot, fitted, settings, progress)
+    unseen = tuple(recording.with_time_scaled(time_base.scale) for recording in held_out)
+    cutoff, delay, width, moving_only = _settle(robot, fitted, settings, progress)
+    fitted, unseen = (tuple(aligned(one, delay.seconds) for one in several) for several in (fitted, unseen))
     clock.lap("tuning")
     progress("moments", 0.0)
     problem = build_problem(robot, fitted, cutoff.cutoff, settings, relative_width=width, moving_only=moving_only)
-    unseen = tuple(
-        make_motion(robot, recording.with_time_scaled(time_base.scale), cutoff.cutoff) for recording in held_out
-    )
+    predicted = tuple(make_motion(robot, recording, cutoff.cutoff) for recording in unseen)
     structural = structural_base_parameters(problem.regressor)
     clock.lap("moments")
     progress("moments", 1.0)
-    return Preparation(robot, time_base, cutoff, problem, unseen, structural, clock.laps)
+    return Preparation(robot, time_base, cutoff, delay, problem, predicted, structural, clock.laps)
 
 
 def solve(preparation: Preparation, settings: Settings, *, progress: Progress = silent) -> IdentificationResult:
@@ -137,6 +140,7 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
         settings=settings,
         time_base=preparation.time_base,
         cutoff=preparation.cutoff,
+        delay=preparation.delay,
         regressor=regressor,
         moments=problem.moments,
         estimate=estimate,
@@ -180,32 +184,39 @@ def _project(
 
 def _settle(
     robot: Robot, recordings: Sequence[Recording], settings: Settings, progress: Progress
-) -> tuple[CutoffChoice, Array, Mask]:
+) -> tuple[CutoffChoice, DelayChoice, Array, Mask]:
     """Cut-off, sharpness of Coulomb friction, whose stands to leave out, each given the others; roughly, then finely.
 
-    The cut-off is chosen with all stands in, so that all candidates are judged by the same equations.
+    The cut-off is chosen with all stands in, so that all candidates are judged by the same equations. The second time
+    the torque's delay has been taken out.
     """
     width: float | Array = USUAL_WIDTH
     moving_only = np.zeros(robot.nv, dtype=bool)
+    delay = given_delay(robot, 0.0)
     for pace, step in (("rough", COARSE_STEP), ("fine", FINE_STEP)):
+        fitted = [aligned(recording, delay.seconds) for recording in recordings]
         cutoff = choose_cutoff(
             robot,
-            recordings,
+            fitted,
             settings,
             relative_width=width,
             step=step,
             progress=lambda share, pace=pace: progress(f"cut-off, {pace}", share),  # type: ignore[misc]
         )
-        moving_only = choose_moving_only(robot, recordings, cutoff.cutoff, settings, width)
+        moving_only = choose_moving_only(robot, fitted, cutoff.cutoff, settings, width)
         width = choose_relative_width(
             robot,
-            recordings,
+            fitted,
             cutoff.cutoff,
             settings,
             moving_only,
             lambda share, pace=pace: progress(f"friction, {pace}", share),  # type: ignore[misc]
         )
-    return cutoff, np.broadcast_to(width, robot.nv), moving_only
+        if pace == "rough":
+            progress("delay", 0.0)
+            delay = choose_delay(robot, recordings, cutoff.cutoff, settings, width)
+            progress("delay", 1.0)
+    return cutoff, delay, np.broadcast_to(width, robot.nv), moving_only
 
 
 class _Clock:

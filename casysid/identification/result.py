@@ -14,6 +14,7 @@ from casysid.dynamics import Regressor
 from casysid.estimation import Estimate, Status
 from casysid.identifiability import BaseParameters
 from casysid.identification.cutoff import CutoffChoice
+from casysid.identification.delay import DelayChoice
 from casysid.identification.links import LinkProperties, link_properties
 from casysid.identification.prediction import TorqueError
 from casysid.identification.settings import Settings
@@ -37,6 +38,7 @@ class IdentificationResult:
         settings: What was asked for.
         time_base: What was found of the recordings' clock.
         cutoff: The low-pass and why.
+        delay: How late the torque was; taken out of all motions here, fitted and held out alike.
         regressor: Of which ``parameters`` are the coefficients.
         moments: Of the fitted recordings.
         estimate: The unconstrained estimate.
@@ -58,6 +60,7 @@ class IdentificationResult:
     settings: Settings
     time_base: TimeBase
     cutoff: CutoffChoice
+    delay: DelayChoice
     regressor: Regressor
     moments: Moments
     estimate: Estimate
@@ -164,6 +167,7 @@ class IdentificationResult:
                 "motion_band_hz": self.cutoff.motion_band,
                 "reason": self.cutoff.reason,
             },
+            "delay": self.delay.to_json(by_joint),
             "relative_error": {
                 "train": self.train.relative,
                 "held_out": held_out.relative if held_out else None,

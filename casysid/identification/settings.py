@@ -22,6 +22,7 @@ class Settings:
         consistency: Physical laws that the parameters are made to obey; None leaves the estimate as it is.
         knowledge: What is known beside the data, such as a total mass; used together with ``consistency``.
         cutoff: Low-pass cut-off [Hz]; None lets the data choose.
+        delay: By how much the torque's time stamps are late against the positions' [s]; None takes it from the data.
         friction: Kinds of friction and drive columns of every joint.
         coulomb_width: Velocity within which Coulomb's smooth sign turns [rad/s, m/s]; None takes it from the velocity's
             noise.
@@ -36,6 +37,7 @@ class Settings:
     consistency: Consistency | None = Consistency.FULL
     knowledge: tuple[Knowledge, ...] = ()
     cutoff: float | None = None
+    delay: float | None = None
     friction: tuple[FrictionColumn, ...] = DEFAULT_FRICTION
     coulomb_width: float | None = None
     couplings: tuple[Coupling, ...] = ()
@@ -49,6 +51,8 @@ class Settings:
             raise ParameterError(f"cut-off must be a positive number of Hz; got {self.cutoff}")
         if self.time_scale is not None and not (np.isfinite(self.time_scale) and self.time_scale > 0):
             raise ParameterError(f"time scale must be a positive number; got {self.time_scale}")
+        if self.delay is not None and not np.isfinite(self.delay):
+            raise ParameterError(f"delay must be a finite number of seconds; got {self.delay}")
         if self.blocks < 4:
             raise ParameterError(
                 f"blocks must be at least 4 for cross-validation and standard errors; got {self.blocks}"

@@ -60,6 +60,7 @@ def _facts(result: IdentificationResult) -> list[str]:
         f"method {result.estimate.method}",
         f"{result.train.samples} samples fitted, {held_out} held out",
         cutoff,
+        f"torque delay {result.delay.reason}",
         f"{result.structural.rank} base parameters, condition number {result.excited.condition_number:.0f}",
     ]
 

@@ -42,11 +42,53 @@ class BandAverage:
     def weights(self, samples: npt.NDArray[np.intp]) -> Any:
         """Sparse weights of the windows over some consecutive samples, shape (windows, samples); rows sum to one."""
         time = self.time[samples]
+        weights, total = _windows(time, self._knots(time))
+        kept = total > SMALLEST_SHARE * total.max()
+        return sparse.diags_array(1.0 / total[kept]) @ weights[kept]
+
+    def beside(
+        self,
+        samples: npt.NDArray[np.intp],
+        values: Array,
+        other_time: Array,
+        other: Array,
+        delays: Array,
+        full: float,
+    ) -> tuple[Array, Array]:
+        """Averages over some consecutive samples, and of another signal by the same windows moved by some delays.
+
+        Args:
+            samples: Which samples.
+            values: At them, shape (samples, n).
+            other_time: The other signal's own time stamps [s], shape (M,).
+            other: Its values, shape (M, m).
+            delays: By how much later than the samples it is looked at [s], shape (K,).
+            full: Windows with less than this share of the usual weight, in either signal, are left out.
+
+        Returns:
+            Averages, shape (windows, n), and those of the other signal, shape (windows, m, K).
+        """
+        time = self.time[samples]
+        knots = self._knots(time)
+        weights, total = _windows(time, knots)
+        kept = total > full * np.median(total)
+        moved = []
+        for delay in delays:
+            first, last = np.searchsorted(other_time, (time[0] + delay, time[-1] + delay))
+            there, weight = _windows(other_time[first:last] - delay, knots)
+            kept &= weight > full * np.median(weight)
+            moved.append((there @ other[first:last]) / np.maximum(weight, 1e-12)[:, None])
+        return (weights @ values)[kept] / total[kept, None], np.stack(moved, axis=2)[kept]
+
+    def _knots(self, time: Array) -> Array:
         span = float(time[-1] - time[0])
         windows = max(int(np.ceil(span * self.cutoff / SPACING)), 1)
         spacing = max(span, 1e-12) / windows
-        knots = time[0] + spacing * np.arange(-DEGREE, windows + DEGREE + 1)
-        weights = BSpline.design_matrix(np.clip(time, time[0], knots[-DEGREE - 1]), knots, DEGREE).T.tocsr()
-        total = np.asarray(weights.sum(axis=1)).ravel()
-        kept = total > SMALLEST_SHARE * total.max()
-        return sparse.diags_array(1.0 / total[kept]) @ weights[kept]
+        return np.asarray(time[0] + spacing * np.arange(-DEGREE, windows + DEGREE + 1))
+
+
+def _windows(time: Array, knots: Array) -> tuple[Any, Array]:
+    """Sparse weights of the windows, shape (windows, samples), and their sums, shape (windows,)."""
+    inside = np.clip(time, knots[DEGREE], knots[-DEGREE - 1])
+    weights = BSpline.design_matrix(inside, knots, DEGREE).T.tocsr()
+    return weights, np.asarray(weights.sum(axis=1)).ravel()

@@ -56,7 +56,11 @@ class Motion:
         return len(self.time)
 
     def decimated(self, stride: int) -> Motion:
-        """Torque averaged over ``stride`` samples, the motion at their middle: for rates far above the low-pass."""
+        """Torque averaged over ``stride`` samples, the motion at their middle: for rates far above the low-pass.
+
+        An even stride has no middle sample; one less is taken then.
+        """
+        stride -= 1 - stride % 2
         if stride <= 1:
             return self
         whole = len(self) // stride * stride
@@ -74,15 +78,20 @@ class Motion:
 def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | None) -> Motion:
     """The recording's positions smoothed at ``cutoff`` [Hz] and differentiated; each stretch between gaps by itself.
 
+    Motion is taken ``recording.torque_delay`` earlier than the torque's time stamp, as it was when the torque acted.
+
     Unordered samples (no time), and timed ones with ``cutoff`` None that carry velocity and acceleration, are taken as
     logged. Logged velocities are otherwise not used: the spline's derivatives of the position are consistent with it.
     """
     if recording.time is None or cutoff is None:
         return _as_logged(robot, recording)
     pieces = [piece for piece in recording.segments if piece.stop - piece.start >= MINIMUM_SAMPLES]
-    smoothed = [_smooth_piece(robot, recording, piece, cutoff) for piece in pieces]
+    wanted = [_rows_with_motion(recording, piece) for piece in pieces]
+    smoothed = [
+        _smooth_piece(robot, recording, piece, rows, cutoff) for piece, rows in zip(pieces, wanted, strict=True)
+    ]
     q, v, a = (np.concatenate([piece[k] for piece in smoothed]) for k in range(3))
-    rows = np.concatenate([np.arange(piece.start, piece.stop) for piece in pieces])
+    rows = np.concatenate(wanted)
     longest = max(pieces, key=lambda piece: piece.stop - piece.start)
     noise = position_noise(recording.time[longest], recording.position[longest])
     return Motion(
@@ -92,7 +101,7 @@ def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | No
         a=a,
         tau=recording.torque[rows],
         velocity_noise=_velocity_noise(robot, recording.time[longest], noise, cutoff),
-        standing=_standing(robot, recording, pieces, noise, v, cutoff),
+        standing=_standing(robot, recording, pieces, wanted, noise, v, cutoff),
         cutoff=cutoff,
     )
 
@@ -138,10 +147,21 @@ def _as_logged(robot: Robot, recording: Recording) -> Motion:
     )
 
 
-def _smooth_piece(robot: Robot, recording: Recording, piece: slice, cutoff: float) -> tuple[Array, Array, Array]:
+def _rows_with_motion(recording: Recording, piece: slice) -> npt.NDArray[np.intp]:
+    """Samples of a stretch whose torque belongs to a motion within it."""
     assert recording.time is not None
-    smoother = build_smoother(recording.time[piece], cutoff)
-    return state_from_channels(robot, *(smoother.smooth(recording.position[piece], order) for order in range(3)))
+    time, rows = recording.time[piece], np.arange(piece.start, piece.stop)
+    moved = time - recording.torque_delay
+    return np.asarray(rows[(moved >= time[0]) & (moved <= time[-1])])
+
+
+def _smooth_piece(
+    robot: Robot, recording: Recording, piece: slice, rows: npt.NDArray[np.intp], cutoff: float
+) -> tuple[Array, Array, Array]:
+    assert recording.time is not None
+    smoother, position = build_smoother(recording.time[piece], cutoff), recording.position[piece]
+    at = recording.time[rows] - recording.torque_delay if recording.torque_delay else None
+    return state_from_channels(robot, *(smoother.smooth(position, order, at) for order in range(3)))
 
 
 def _velocity_noise(robot: Robot, time: Array, channel_noise: Array, cutoff: float) -> Array:
@@ -154,19 +174,33 @@ def _velocity_noise(robot: Robot, time: Array, channel_noise: Array, cutoff: flo
 
 
 def _standing(
-    robot: Robot, recording: Recording, pieces: Sequence[slice], channel_noise: Array, v: Array, cutoff: float
+    robot: Robot,
+    recording: Recording,
+    pieces: Sequence[slice],
+    wanted: Sequence[npt.NDArray[np.intp]],
+    channel_noise: Array,
+    v: Array,
+    cutoff: float,
 ) -> npt.NDArray[np.bool_]:
     """Stands of the joints with one channel each; no window of the search is longer than a period of the cut-off."""
     rates, channels = _single_channels(robot)
     speed = np.sqrt(np.mean(v[:, rates] ** 2, axis=0))
     stands = np.zeros(v.shape, dtype=bool)
-    stands[:, rates] = np.concatenate(
-        [
-            standing(recording.position[piece, channels], recording.rate, channel_noise[channels], speed, 1.0 / cutoff)
-            for piece in pieces
-        ]
-    )
+    found = [
+        standing(recording.position[piece, channels], recording.rate, channel_noise[channels], speed, 1.0 / cutoff)
+        for piece in pieces
+    ]
+    at = [_samples_of_motion(recording, piece, rows) for piece, rows in zip(pieces, wanted, strict=True)]
+    stands[:, rates] = np.concatenate([still[rows] for still, rows in zip(found, at, strict=True)])
     return stands
+
+
+def _samples_of_motion(recording: Recording, piece: slice, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    """The samples of a stretch nearest to the motion that belongs to the torque of ``rows``."""
+    assert recording.time is not None
+    time = recording.time[piece]
+    number = np.interp(recording.time[rows] - recording.torque_delay, time, np.arange(len(time)))
+    return np.asarray(np.rint(number).astype(np.intp))
 
 
 def _single_channels(robot: Robot) -> tuple[list[int], list[int]]:

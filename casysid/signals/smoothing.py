@@ -42,14 +42,21 @@ class Smoother:
     _basis: Any
     _factor: Array
 
-    def smooth(self, values: Array, derivative: int = 0) -> Array:
-        """The smoothed ``values``, shape (N,) or (N, n), or a time derivative of them, at the sample times."""
+    def smooth(self, values: Array, derivative: int = 0, at: Array | None = None) -> Array:
+        """The smoothed ``values``, shape (N,) or (N, n), or a time derivative of them, at the sample times or others.
+
+        Args:
+            values: At the sample times.
+            derivative: Of which order.
+            at: Times [s], shape (M,), not beyond the samples; None takes the sample times.
+        """
         if len(values) != len(self.time):
             raise ParameterError(f"smoother: built for {len(self.time)} samples, got {len(values)}")
         coefficients = cho_solve_banded((self._factor, True), self._basis.T @ values)
-        if derivative == 0:
+        if derivative == 0 and at is None:
             return np.asarray(self._basis @ coefficients)
-        return np.asarray(derivative_basis(self.time, self._knots, self._degree, derivative) @ coefficients)
+        times = self.time if at is None else at
+        return np.asarray(derivative_basis(times, self._knots, self._degree, derivative) @ coefficients)
 
     @property
     def _degree(self) -> int:

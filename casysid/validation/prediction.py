@@ -17,6 +17,7 @@ from casysid.identification import CutoffChoice, Settings, TorqueError, choose_c
 from casysid.identification.problem import USUAL_WIDTH, coulomb_width, make_motion
 from casysid.recording import Recording
 from casysid.robot import Robot
+from casysid.signals import aligned
 
 Drives = Mapping[str, Mapping[str, float | None]]
 """Friction and armature by joint and kind, as in a ``result.json``."""
@@ -69,6 +70,7 @@ def validate(
     recordings: Sequence[Recording],
     *,
     drives: Drives | None = None,
+    delays: Mapping[str, float] | None = None,
     cutoff: float | None = None,
     progress: Callable[[str, float], None] = lambda stage, share: None,
 ) -> Validation:
@@ -78,6 +80,7 @@ def validate(
         robot: Its links' parameters are judged, and its friction unless ``drives`` says otherwise.
         recordings: At least one.
         drives: Friction, offset and armature to take instead of the file's, which has no place for all of them.
+        delays: By how much the logged torque is late, by joint [s].
         cutoff: Low-pass [Hz] of motion and torque; None lets the data choose.
         progress: Told the stage and the share done.
 
@@ -87,6 +90,8 @@ def validate(
     if not recordings:
         raise ParameterError("validate: at least one recording is needed; got none")
     settings = Settings(cutoff=cutoff, couplings=_couplings(robot, drives or {}))
+    late = np.array([(delays or {}).get(dof, 0.0) for dof in robot.dofs])
+    recordings = [aligned(recording, late) for recording in recordings]
     choice = choose_cutoff(robot, recordings, settings, progress=lambda share: progress("cut-off", share))
     progress("predict", 0.0)
     motions = [make_motion(robot, recording, choice.cutoff) for recording in recordings]
@@ -143,6 +148,19 @@ def read_drives(path: Path) -> tuple[Drives, float | None]:
         raise ParameterError(
             f"{path}: wanted the result.json of an identification, with its 'friction' and 'cutoff'; {error!r}"
         ) from error
+
+
+def read_delays(path: Path) -> Mapping[str, float]:
+    """By how much the torque was late, by joint [s], in a ``result.json``; empty where it says nothing of it.
+
+    Raises:
+        ParameterError: The file is not such a result.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return {str(joint): float(late) for joint, late in content.get("delay", {}).get("seconds", {}).items()}
+    except (OSError, ValueError, AttributeError, TypeError) as error:
+        raise ParameterError(f"{path}: wanted the result.json of an identification; {error!r}") from error
 
 
 def _couplings(robot: Robot, drives: Drives) -> tuple[Coupling, ...]:

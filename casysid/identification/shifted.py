@@ -1,0 +1,159 @@
+"""Moments with the torque at several delays at once: one pass over the data serves every delay in between.
+
+The averaged equations ``F x(t) θ = F tau(t + δ)`` have the same left side whatever the delay ``δ`` of the torque. Its
+right side is averaged at a few delays, the nodes, by windows moved against the torque's own time stamps, so nothing is
+interpolated between samples. What it is in between follows by Lagrange's polynomial, because averages vary slowly; and
+so do all second moments, and their slopes in ``δ``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+from casysid.arrays import Array, frozen
+from casysid.dynamics import Regressor
+from casysid.moments import Moments
+from casysid.recording import Recording
+from casysid.signals import BandAverage, Motion
+
+NODES = 13
+NODE_SPACING = 0.1
+"""In periods of the cut-off."""
+FULL_WINDOW = 0.9
+"""A window with less than this share of the usual weight, of motion or of torque, is left out."""
+SAMPLES_PER_PERIOD = 20
+"""Torque of a far higher rate is averaged down to so many samples in a period of the cut-off first."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftedMoments:
+    """Sums of ``r rᵀ``, ``r = [x, y_1 .. y_K]``, by block of time and joint, ``y_k`` the torque ``nodes[k]`` later.
+
+    Attributes:
+        gram: Shape (blocks, joints, p + K, p + K).
+        count: Rows in each sum, shape (blocks, joints).
+        nodes: Delays [s], evenly spaced, shape (K,).
+        regressor: Of the rows ``x``.
+    """
+
+    gram: Array
+    count: Array
+    nodes: Array
+    regressor: Regressor
+
+    def at(self, delays: Array, groups: Array | None = None) -> Moments:
+        """Moments of ``[x, z_1 .. z_G, y]`` with the torque taken ``delays`` later, shape (joints,) [s].
+
+        Args:
+            delays: Within the nodes.
+            groups: Shape (G, joints): each gives a column ``z_g``, minus the torque's slope in the delay of its joints.
+                The coefficient of ``z_g`` is what is to be added to their delays.
+        """
+        p, joints = len(self.regressor.names), len(delays)
+        values, slopes = self._lagrange(delays)
+        groups = np.zeros((0, joints)) if groups is None else groups
+        mixing = np.concatenate([-groups[:, :, None] * slopes, values[None]])  # (G + 1, joints, K)
+        size = p + len(mixing)
+        gram = np.empty((*self.gram.shape[:2], size, size))
+        gram[..., :p, :p] = self.gram[..., :p, :p]
+        mixed = np.einsum("bjmk,gjk->bjmg", self.gram[..., p:], mixing)
+        gram[..., :p, p:] = mixed[..., :p, :]
+        gram[..., p:, :p] = np.swapaxes(mixed[..., :p, :], 2, 3)
+        gram[..., p:, p:] = np.einsum("bjkg,hjk->bjhg", mixed[..., p:, :], mixing)
+        names = (*self.regressor.names, *(f"delay_{g + 1}" for g in range(len(groups))))
+        return Moments(gram, self.count, names, self.regressor.robot.dofs)
+
+    def _lagrange(self, delays: Array) -> tuple[Array, Array]:
+        """Weights of the nodes for the torque and for its slope at each delay, shape (joints, K) each."""
+        step = self.nodes[1] - self.nodes[0]
+        powers = np.vander(np.arange(len(self.nodes)) - (len(self.nodes) - 1) / 2, increasing=True).T
+        u = (delays - self.nodes.mean()) / step
+        k = np.arange(len(self.nodes))
+        monomials = u[:, None] ** k
+        slopes = np.where(k > 0, k * u[:, None] ** np.maximum(k - 1, 0), 0.0) / step
+        return np.linalg.solve(powers, monomials.T).T, np.linalg.solve(powers, slopes.T).T
+
+
+def node_delays(centre: float, cutoff: float) -> Array:
+    """Delays around ``centre`` [s] that suffice for averages up to ``cutoff`` [Hz]."""
+    return np.asarray(centre + (np.arange(NODES) - (NODES - 1) / 2) * NODE_SPACING / cutoff)
+
+
+def sum_shifted_moments(
+    regressor: Regressor,
+    motions: Sequence[Motion],
+    recordings: Sequence[Recording],
+    nodes: Array,
+    cutoff: float,
+    *,
+    blocks: int = 20,
+    threads: int = 2,
+) -> ShiftedMoments:
+    """One pass over all recordings.
+
+    Args:
+        regressor: Gives the rows ``x``.
+        motions: The smoothed recordings, possibly at fewer samples.
+        recordings: Whose torque is taken.
+        nodes: Delays [s], shape (K,).
+        cutoff: Of the equations' average [Hz].
+        blocks: Blocks of time of each recording.
+        threads: Threads of the regressor's evaluation.
+    """
+    parts = [
+        _sum_one(regressor, motion, _thinned(recording, cutoff), nodes, cutoff, blocks, threads)
+        for motion, recording in zip(motions, recordings, strict=True)
+    ]
+    gram, count = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return ShiftedMoments(gram, np.repeat(count[:, None], regressor.robot.nv, axis=1), frozen(nodes), regressor)
+
+
+def _thinned(recording: Recording, cutoff: float) -> tuple[Array, Array]:
+    """Time and torque, averaged over neighbours down to a rate that is plenty for the cut-off."""
+    assert recording.time is not None
+    stride = max(int(recording.rate / (SAMPLES_PER_PERIOD * cutoff)), 1)
+    whole = len(recording) // stride * stride
+    time = recording.time[:whole].reshape(-1, stride).mean(axis=1)
+    return time, recording.torque[:whole].reshape(-1, stride, len(recording.dofs)).mean(axis=1)
+
+
+def _sum_one(
+    regressor: Regressor,
+    motion: Motion,
+    torque: tuple[Array, Array],
+    nodes: Array,
+    cutoff: float,
+    blocks: int,
+    threads: int,
+) -> tuple[Array, Array]:
+    """Sums over one recording, shape (blocks, joints, p + K, p + K), and rows by block, shape (blocks,)."""
+    p, size = len(regressor.names), len(regressor.names) + len(nodes)
+    ends = np.searchsorted(motion.time, [torque[0][0] - min(nodes[0], 0.0), torque[0][-1] - max(nodes[-1], 0.0)])
+    inside = np.arange(*ends)
+    gram, count = np.zeros((blocks, regressor.robot.nv, size, size)), np.zeros(blocks)
+    inputs, _ = regressor.equations.check((motion.q, motion.v, motion.a, motion.tau))
+    starts = np.cumsum([0, *(len(columns) + 1 for columns in regressor.row_columns)])
+
+    def square(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, list[Array]]:
+        average = BandAverage(motion.time, cutoff)
+        x, y = average.beside(piece, values.T, *torque, nodes, FULL_WINDOW)
+        rows = [
+            np.hstack([x[:, start : stop - 1], y[:, joint]]) for joint, (start, stop) in enumerate(pairwise(starts))
+        ]
+        return len(x), [r.T @ r for r in rows]
+
+    with threadpool_limits(1, user_api="blas"):
+        for block, (equations, squares) in regressor.equations.map(
+            square, inputs, np.array_split(inside, blocks), threads
+        ):
+            count[block] += equations
+            for joint, columns in enumerate(regressor.row_columns):
+                places = np.append(columns, np.arange(p, size))
+                gram[block, joint, places[:, None], places] += squares[joint]
+    return gram, count
