@@ -21,8 +21,6 @@ from casysid.arrays import Array, frozen
 from casysid.errors import RecordingError
 from casysid.estimation import Ridge
 from casysid.estimation.cross_validation import contiguous_folds
-from casysid.estimation.ridge import choose_strength
-from casysid.estimation.standardise import standardise
 from casysid.identification.problem import MINIMUM_BLOCKS, build_problem
 from casysid.identification.settings import Settings
 from casysid.identification.shifted import NODE_SPACING, NODES, ShiftedMoments, node_delays, sum_shifted_moments
@@ -142,7 +140,8 @@ class _Search:
         self._problem = build_problem(robot, recordings, cutoff, settings, relative_width=relative_width, quick=True)
         self._regressor, self._nv = self._problem.regressor, robot.nv
         self._prior = self._regressor.prior
-        self._strength = choose_strength(standardise(self._problem.moments, self._prior), FOLDS)
+        usual = Ridge(standard_errors=False).estimate(self._problem.moments, self._prior)
+        self._strength = usual.diagnostics.get("strength", 0.0)
         self._sample = 1.0 / max(recording.rate for recording in recordings)
 
     def run(self) -> DelayChoice | None:
