@@ -19,7 +19,7 @@ import numpy as np
 
 from casysid.arrays import Array, frozen
 from casysid.errors import RecordingError
-from casysid.estimation import Ridge
+from casysid.estimation import Ridge, WeightedLeastSquares
 from casysid.estimation.cross_validation import contiguous_folds
 from casysid.identification.problem import MINIMUM_BLOCKS, build_problem
 from casysid.identification.settings import Settings
@@ -33,6 +33,8 @@ CLEAR_GAIN = 2.5
 """The gain on blocks left out must be so many of its standard errors."""
 WORTHWHILE_GAIN = 1e-3
 """And this share of the squared error."""
+OWN_GAIN = 0.5
+"""Joints get delays of their own for no less than this share, for their friction and elasticity look like delays, too."""
 FOLDS = 5
 STEPS, CONVERGED = 20, 1e-3
 """Of Gauss-Newton; converged when a step is less than this many samples."""
@@ -170,7 +172,7 @@ class _Search:
             more = _compare(
                 self._left_out(shifted, common.delays, own.weights), self._left_out(shifted, own.delays, own.weights)
             )
-            if more.is_clear:
+            if more.is_clear and more.share > OWN_GAIN:
                 gain = _compare(
                     self._left_out(zero, none, own.weights), self._left_out(shifted, own.delays, own.weights)
                 )
@@ -203,11 +205,10 @@ class _Search:
 
     def _fit(self, shifted: ShiftedMoments, groups: Array, start: Array) -> _Fit | None:
         """Gauss-Newton on the delays of groups of joints; None when it does not settle within the nodes."""
-        ridge = Ridge(strength=self._strength, standard_errors=False)
         delays, prior = start, np.append(self._prior, np.zeros(len(groups)))
         low, high = shifted.nodes[1], shifted.nodes[-2]
         for _ in range(STEPS):
-            estimate = ridge.estimate(shifted.at(delays, groups), prior)
+            estimate = WeightedLeastSquares().estimate(shifted.at(delays, groups), prior)
             step = estimate.parameters[-len(groups) :] @ groups
             moved = np.clip(delays + step, low, high)
             settled = np.abs(moved - delays).max() < CONVERGED * self._sample
@@ -216,7 +217,6 @@ class _Search:
                 break
         else:
             return None
-        estimate = Ridge(strength=self._strength).estimate(shifted.at(delays, groups), prior)
         std = np.sqrt(np.diag(estimate.covariance))[-len(groups) :]
         return _Fit(delays, std @ groups, estimate.noise_std**-2.0)
 
