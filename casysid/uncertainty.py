@@ -51,6 +51,7 @@ class ParameterUncertainty:
         link_std: Their standard errors, infinite likewise, shape (links, 10).
         freedom: Degrees of freedom; inf where not known.
         non_negative: Which of the p parameters cannot be negative, shape (p,).
+        spread: Of the estimate before the projection: what the data see, and what they decided.
     """
 
     parameters: Array
@@ -60,6 +61,7 @@ class ParameterUncertainty:
     link_std: Array
     freedom: float
     non_negative: Array
+    spread: Spread
 
     def __post_init__(self) -> None:
         for name in ("parameters", "covariance", "std", "links", "link_std"):
@@ -181,6 +183,7 @@ def _uncertainty(
         link_std=link_std,
         freedom=spread.freedom,
         non_negative=non_negative,
+        spread=spread,
     )
 
 

@@ -35,7 +35,7 @@ from casysid.arrays import Array
 from casysid.bundled import find_model
 from casysid.dynamics import DEFAULT_FRICTION, Armature, Coulomb, FrictionColumn
 from casysid.estimation import WeightedLeastSquares
-from casysid.identification import IdentificationResult, Settings, identify
+from casysid.identification import IdentificationResult, Settings, identify, torque_band
 from casysid.inertia import inertial_parameters, mass_properties
 from casysid.recording import Recording
 from casysid.robot import Robot
@@ -51,7 +51,6 @@ from casysid.simulation import (
     design_sinusoids,
     simulate,
 )
-from casysid.uncertainty import torque_std
 from casysid.validation.truth import true_coefficients
 
 DURATION, RATE, CUTOFF = 12.0, 250.0, 8.0  # [s], [Hz], [Hz]
@@ -186,17 +185,16 @@ def covered(result: IdentificationResult, plant: Plant) -> dict[str, list[float]
         "base parameters": combination.astype(float).tolist(),
         "masses": inside[masses].astype(float).tolist(),
         "friction": inside[[k for k in friction if told[k]]].astype(float).tolist(),
-        "held-out torque": band_coverage(result, quantile),
+        "held-out torque": band_coverage(result),
     }
 
 
-def band_coverage(result: IdentificationResult, quantile: float) -> list[float]:
+def band_coverage(result: IdentificationResult) -> list[float]:
     """Share of the held-out samples within the 95 % band of predicted torque, by joint, in the band of the fit."""
     (motion,), unseen = result.held_out_motions, result.held_out
     assert unseen is not None
-    std = torque_std(result.regressor, result.uncertainty.covariance, motion.q, motion.v, motion.a)
-    half = quantile * np.sqrt(std**2 + result.train.rmse**2)
-    return np.asarray(np.mean(np.abs(unseen.measured[0] - unseen.predictions[0]) <= half, axis=0)).tolist()
+    error = np.abs(unseen.measured[0] - unseen.predictions[0])
+    return np.asarray(np.mean(error <= torque_band(result, motion), axis=0)).tolist()
 
 
 def summarise(found: list[dict[str, dict[str, list[float]]]]) -> dict[str, dict[str, object]]:

@@ -6,6 +6,7 @@ An estimator is a frozen dataclass of hyperparameters. It sees :class:`~casysid.
 
 from __future__ import annotations
 
+import dataclasses
 import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,6 +21,9 @@ from casysid.moments import Moments
 
 LEVERAGE_TOLERANCE = 1e-6
 """A coordinate with more than this share of its squared length in unseen directions is unseen."""
+
+ROUNDING = 1e-12
+"""Relative eigenvalues below this are rounding."""
 
 
 class Status(enum.Enum):
@@ -39,16 +43,43 @@ class Spread:
         hidden: Basis of the directions that the data do not see, shape (p, p - r), orthonormal in units of ``scale``.
         scale: Of each parameter, shape (p,): what makes torque of unit energy.
         freedom: Degrees of freedom behind the covariance: intervals take Student's quantile; inf where not known.
+        open: Covariance of what was open before the data, up to a factor, shape (p, p): the prior's, or parameters of
+            size ``scale`` that have nothing to do with each other.
+        settled: The part of it that the data have settled, shape (p, p).
     """
 
     covariance: Array
     hidden: Array
     scale: Array
     freedom: float
+    open: Array
+    settled: Array
 
     def __post_init__(self) -> None:
-        for name in ("covariance", "hidden", "scale"):
+        for name in ("covariance", "hidden", "scale", "open", "settled"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @classmethod
+    def without_prior(cls, covariance: Array, hidden: Array, scale: Array, freedom: float) -> Spread:
+        """Of an estimator that leans on nothing: all that the data see they settle."""
+        seen = np.eye(len(scale)) - hidden @ hidden.T
+        sizes = np.outer(scale, scale)
+        return cls(covariance, hidden, scale, freedom, np.diag(scale**2), sizes * seen)
+
+    def decided(self, gradients: Array) -> Array:
+        """Share of quantities of the given gradients (k, p) that the data decided and not the prior, shape (k,)."""
+        before = np.einsum("km,mn,kn->k", gradients, self.open, gradients, optimize=True)
+        after = np.einsum("km,mn,kn->k", gradients, self.settled, gradients, optimize=True)
+        return np.asarray(np.clip(np.divide(after, before, out=np.zeros_like(before), where=before > 0.0), 0.0, 1.0))
+
+    def decidable(self, gradients: Array, combinations: Array) -> Array:
+        """Share that perfect data would decide of quantities (k, p), who show certain combinations (r, p), (k,)."""
+        across = combinations @ self.open
+        size = np.sqrt(np.maximum(np.einsum("rp,rp->r", across, combinations), np.finfo(np.float64).tiny))
+        values, vectors = np.linalg.eigh((across @ combinations.T) / np.outer(size, size))
+        sound = values > ROUNDING * values.max(initial=0.0)
+        root = vectors[:, sound].T @ (across / size[:, None]) / np.sqrt(values[sound])[:, None]
+        return dataclasses.replace(self, settled=root.T @ root).decided(gradients)
 
     def sees(self, gradients: Array) -> npt.NDArray[np.bool_]:
         """Whether the data tell quantities of the given gradients, shape (k, p); a boolean for each."""

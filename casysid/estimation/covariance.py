@@ -75,15 +75,16 @@ def covariance_from_blocks(moments: Moments, parameters: Array, weights: Array, 
     M, freedom = _covariance_of_scores(moments, scores, parameters, weights)
     scale = np.where(live, inverse, inverse.max(initial=0.0) or 1.0)
     if prior is None or not known.any():
-        covariance = W @ M @ W.T
-    else:
-        sight = np.where(live, np.sqrt(energy), 0.0)[:, None] * vectors[:, known] * np.sqrt(values[known])  # H W
-        covariance = _pulled(M, W.T @ normal.xy, sight, prior)
-    return Spread(covariance, vectors[:, ~known], scale, freedom)
+        return Spread.without_prior(W @ M @ W.T, vectors[:, ~known], scale, freedom)
+    sight = np.where(live, np.sqrt(energy), 0.0)[:, None] * vectors[:, known] * np.sqrt(values[known])  # H W
+    covariance, settled = _pulled(M, W.T @ normal.xy, sight, prior)
+    return Spread(covariance, vectors[:, ~known], scale, freedom, prior, settled)
 
 
-def _pulled(meat: Array, solution: Array, sight: Array, prior: Array) -> Array:
-    """The mean square error of a ridge, shape (p, p); what the data do not see moves along as the prior lets it.
+def _pulled(meat: Array, solution: Array, sight: Array, prior: Array) -> tuple[Array, Array]:
+    """The mean square error of a ridge, and what of the prior's covariance it has settled, shape (p, p) each.
+
+    What the data do not see moves along as the prior lets it.
 
     Args:
         meat: ``M``, in directions of unit information, shape (r, r).
@@ -98,7 +99,8 @@ def _pulled(meat: Array, solution: Array, sight: Array, prior: Array) -> Array:
     error = np.where(_shown_off(off, np.diag(noise), variance * q), np.maximum(off**2 / q, variance), variance)
     shrunk = prior @ sight @ vectors / (1.0 + q)
     held = shrunk / np.sqrt(q)
-    return np.asarray(shrunk @ noise @ shrunk.T + (held * error) @ held.T)
+    covariance = shrunk @ noise @ shrunk.T + (held * error) @ held.T
+    return covariance, (shrunk * (1.0 + q)) @ shrunk.T
 
 
 def _shown_off(off: Array, noise: Array, expected: Array) -> npt.NDArray[np.bool_]:

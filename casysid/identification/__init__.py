@@ -1,5 +1,6 @@
 """The pipeline: recordings in, identified parameters with their check out."""
 
+from casysid.identification.bands import torque_band
 from casysid.identification.comparison import Comparison, compare
 from casysid.identification.cutoff import CutoffChoice, choose_cutoff
 from casysid.identification.links import LinkProperties
@@ -7,19 +8,23 @@ from casysid.identification.pipeline import Preparation, identify, prepare, solv
 from casysid.identification.prediction import TorqueError, torque_error
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
+from casysid.identification.sources import Excitation, Sources
 
 __all__ = [
     "Comparison",
     "CutoffChoice",
+    "Excitation",
     "IdentificationResult",
     "LinkProperties",
     "Preparation",
     "Settings",
+    "Sources",
     "TorqueError",
     "choose_cutoff",
     "compare",
     "identify",
     "prepare",
     "solve",
+    "torque_band",
     "torque_error",
 ]

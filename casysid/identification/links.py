@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from casysid.arrays import Array, frozen
 from casysid.identifiability import Identifiability
+from casysid.identification.sources import Excitation, Sources
 from casysid.uncertainty import PARAMETER_OF_INERTIA, link_quantities
 
 
@@ -22,6 +24,8 @@ class LinkProperties:
         center_of_mass_std: Shape (3,).
         inertia_std: Shape (6,).
         identifiable: Of the ten parameters m, mcx.. Izz: what the mechanism lets anyone know.
+        excitation: Of the same: whether these recordings show it.
+        by_data: Of the same: the share that the data decided and not the model file, shape (10,).
     """
 
     name: str
@@ -32,10 +36,11 @@ class LinkProperties:
     center_of_mass_std: Array
     inertia_std: Array
     identifiable: tuple[Identifiability, ...]
+    excitation: tuple[Excitation, ...]
+    by_data: Array
 
     def to_json(self) -> dict[str, object]:
         """Plain numbers and lists."""
-        words = [one.value for one in self.identifiable]
         return {
             "mass": self.mass,
             "center_of_mass": self.center_of_mass.tolist(),
@@ -45,18 +50,23 @@ class LinkProperties:
                 "center_of_mass": self.center_of_mass_std.tolist(),
                 "inertia": self.inertia_std.tolist(),
             },
-            "identifiable": {
-                "mass": words[0],
-                "center_of_mass": words[1:4],
-                "inertia": [words[k] for k in PARAMETER_OF_INERTIA],
-            },
+            "identifiable": _by_quantity([one.value for one in self.identifiable]),
+            "excited": _by_quantity([one.value for one in self.excitation]),
+            "decided_by_data": _by_quantity(self.by_data.tolist()),
         }
 
 
-def link_properties(
-    name: str, parameters: Array, std: Array, identifiable: tuple[Identifiability, ...]
-) -> LinkProperties:
-    """One link from its ten parameters, shape (10,), and the standard errors of its quantities, shape (10,)."""
+def _by_quantity(values: list[Any]) -> dict[str, Any]:
+    """What is said of the ten parameters under the names of the quantities that they stand for."""
+    return {
+        "mass": values[0],
+        "center_of_mass": values[1:4],
+        "inertia": [values[k] for k in PARAMETER_OF_INERTIA],
+    }
+
+
+def link_properties(name: str, parameters: Array, std: Array, sources: Sources) -> LinkProperties:
+    """One link from its ten parameters, the standard errors of its quantities, (10,) each, and what decided them."""
     quantities = link_quantities(parameters[None])[0]
     return LinkProperties(
         name=name,
@@ -66,5 +76,7 @@ def link_properties(
         mass_std=float(std[0]),
         center_of_mass_std=frozen(std[1:4]),
         inertia_std=frozen(std[4:]),
-        identifiable=identifiable,
+        identifiable=sources.identifiable,
+        excitation=sources.excitation,
+        by_data=sources.by_data,
     )

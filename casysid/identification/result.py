@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from casysid.identification.delay import DelayChoice
 from casysid.identification.links import LinkProperties, link_properties
 from casysid.identification.prediction import TorqueError
 from casysid.identification.settings import Settings
+from casysid.identification.sources import Sources, sources_of
 from casysid.identification.time_base import TimeBase
 from casysid.inertia import smallest_eigenvalue
 from casysid.moments import Moments
@@ -119,16 +121,16 @@ class IdentificationResult:
 
     def links(self) -> tuple[LinkProperties, ...]:
         """Mass, centre of mass and inertia of every link with their standard errors."""
-        identifiable = self.structural.identifiability()
+        places = [slice(10 * k, 10 * k + 10) for k in range(len(self.robot.links))]
         return tuple(
-            link_properties(
-                link,
-                self.parameters[10 * k : 10 * k + 10],
-                self.uncertainty.link_std[k],
-                identifiable[10 * k : 10 * k + 10],
-            )
-            for k, link in enumerate(self.robot.links)
+            link_properties(link, self.parameters[ten], std, self.sources.within(ten))
+            for link, ten, std in zip(self.robot.links, places, self.uncertainty.link_std, strict=True)
         )
+
+    @cached_property
+    def sources(self) -> Sources:
+        """How far the data decided each parameter, and how far the model file."""
+        return sources_of(self.uncertainty.spread, self.structural)
 
     def drive_parameters(self) -> dict[str, dict[str, float | None]]:
         """Friction and armature by degree of freedom, couplings by name; None for a kind that is not in the model."""
@@ -195,6 +197,8 @@ class IdentificationResult:
             "links": {link.name: link.to_json() for link in self.links()},
             "friction": self.drive_parameters(),
             "friction_std": self.drive_std(),
+            "friction_decided_by_data": self._by_drive(self.sources.by_data),
+            "decided_by_the_file": list(self.sources.of_the_file),
             "degrees_of_freedom": self.uncertainty.freedom,
             "diagnostics": dict(self.estimate.diagnostics),
         }

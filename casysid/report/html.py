@@ -10,7 +10,7 @@ from pathlib import Path
 from casysid.identification import IdentificationResult
 from casysid.identification.verdict import judge
 from casysid.report.pictures import cutoff_figure, inline_png, torque_figure
-from casysid.report.tables import Table, drive_table, error_table, link_table
+from casysid.report.tables import Table, drive_table, error_table, link_table, source_table
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,12 @@ def _sections(result: IdentificationResult) -> list[Section]:
             "line is against the torque as logged.",
             table=error_table(result),
         ),
-        Section(f"Torque on {shown} data", picture=inline_png(torque_figure(result))),
+        Section(
+            f"Torque on {shown} data",
+            "The band holds 95 % of what is measured, if the parameters are as sure as they are said to be and "
+            "residuals as large as in the fit.",
+            picture=inline_png(torque_figure(result)),
+        ),
         Section("Friction and drive", "SI units at the joint.", table=drive_table(result)),
         Section(
             "Links",
@@ -82,6 +87,15 @@ def _sections(result: IdentificationResult) -> list[Section]:
             table=link_table(result),
             lines_title=f"The {result.structural.rank} combinations that the torque depends on",
             lines=result.structural.words(),
+        ),
+        Section(
+            "What decided the links' parameters",
+            "The mechanism lets a parameter be known by itself, only in combination with others, or not at all; the "
+            "recordings excite it when they show most of what the mechanism lets anyone know. The last column is the "
+            "share that the data decided: the rest is the model file's.",
+            table=source_table(result),
+            lines_title=f"{len(result.sources.of_the_file)} parameters are the model file's rather than the data's",
+            lines=(", ".join(result.sources.of_the_file),),
         ),
     ]
     if len(result.cutoff.candidates):

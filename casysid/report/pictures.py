@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.identification import IdentificationResult
+from casysid.identification import IdentificationResult, torque_band
 from casysid.signals import Motion
 
 MEASURED, PREDICTED, RESIDUAL = "#9aa5b1", "#1f6feb", "#d1495b"
+BAND = "#c9dcf8"
 MOST_POINTS = 3000
 
 
@@ -42,19 +43,22 @@ def figure_grid(width: float, height: float, columns: int) -> tuple[Any, Any]:
 
 
 def torque_figure(result: IdentificationResult) -> Any:
-    """Measured and predicted torque of each joint over the first held-out motion, or the first fitted one."""
+    """Measured and predicted torque of each joint with its 95 % band, over the first held-out or else fitted motion."""
     error = result.held_out or result.train
     motion: Motion = (result.held_out_motions or result.train_motions)[0]
     measured, predicted = error.measured[0], error.predictions[0]
+    band = torque_band(result, motion)
     pick = slice(None, None, max(1, len(motion) // MOST_POINTS))
     canvas, axes = figure(9.5, 1.0 + 1.35 * len(result.robot.dofs), len(result.robot.dofs))
     for k, (ax, dof) in enumerate(zip(axes, result.robot.dofs, strict=True)):
         ax.plot(motion.time[pick], measured[pick, k], color=MEASURED, linewidth=2.4, label="measured, low-passed")
+        lower, upper = predicted[pick, k] - band[pick, k], predicted[pick, k] + band[pick, k]
+        ax.fill_between(motion.time[pick], lower, upper, color=BAND, linewidth=0.0, label="95 % band")
         ax.plot(motion.time[pick], predicted[pick, k], color=PREDICTED, linewidth=1.0, label="predicted")
         ax.plot(motion.time[pick], (measured - predicted)[pick, k], color=RESIDUAL, linewidth=0.7, label="difference")
         _limit(ax, measured[:, k], predicted[:, k])
         ax.set_ylabel(f"{dof}\n{torque_unit(result, k)}", fontsize=8)
-    axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=3, frameon=False, fontsize=8)
+    axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=4, frameon=False, fontsize=8)
     axes[-1].set_xlabel("time [s]")
     canvas.align_ylabels(axes)
     return canvas

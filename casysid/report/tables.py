@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from casysid.identification import IdentificationResult
 from casysid.identification.result import JOINT_KINDS
+from casysid.inertia import KINDS
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,27 @@ def link_table(result: IdentificationResult) -> Table:
         )
     header = ("link", "mass [kg]", "± std", "centre of mass [m]", "Ixx, Iyy, Izz at it [kg m²]", "mass identifiable")
     return Table(header, tuple(rows))
+
+
+def source_table(result: IdentificationResult) -> Table:
+    """Of every link, in words: which parameters can be known, which these recordings show, and what decided them."""
+    rows = []
+    for link in result.links():
+        alike: dict[tuple[str, str], list[int]] = {}
+        for k, words in enumerate(zip(link.identifiable, link.excitation, strict=True)):
+            alike.setdefault((words[0].value, words[1].value), []).append(k)
+        for (known, shown), places in alike.items():
+            kinds = ", ".join(KINDS[k] for k in places)
+            rows.append((link.name, kinds, known, shown, _range([float(link.by_data[k]) for k in places])))
+    return Table(
+        ("link", "parameters at its joint", "identifiable", "these recordings", "decided by the data"), tuple(rows)
+    )
+
+
+def _range(shares: list[float]) -> str:
+    """Shares in per cent, from the smallest to the largest."""
+    low, high = round(100.0 * min(shares)), round(100.0 * max(shares))
+    return f"{low} %" if low == high else f"{low} … {high} %"
 
 
 def drive_table(result: IdentificationResult) -> Table:
