@@ -1,48 +1,51 @@
 """The robots of Ting et al. (2006), §IV-B and §IV-C, in simulation: recorded, identified by each method, and tracked.
 
-Each seed is a machine of its own that differs from its model file. All methods of the paper see the same moments:
-positions through one zero-phase low-pass, the same regressor, the same weights between joints, no prior. Beyond the
-paper is weighted least squares with a filter that the data chose, without the samples at which a joint stands, because
-stiction has no column.
+Each seed is a machine of its own that differs from its model file. The paper's methods see what its authors had: motion
+by differences of the encoders' positions at the control rate, all signals behind the low-pass of the controller's
+velocity; the same moments, regressor and weights between joints for all, no prior. Beyond the paper are casysid's own:
+motion from a spline, equations averaged below a cut-off that the data chose, the model file as prior, and equations of
+joints that friction holds left out.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-import operator
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import lfilter
 
-from casysid.accumulation import accumulate_moments
+from casysid.arrays import Array
 from casysid.bundled import find_model
-from casysid.dynamics import DEFAULT_FRICTION, FrictionColumn, Regressor, Viscous
+from casysid.dynamics import DEFAULT_FRICTION, Coulomb, Regressor, Viscous, build_regressor
 from casysid.errors import CasysidError, CasysidWarning
-from casysid.estimation import LassoRegression, Ridge, StepwiseRegression, WeightedLeastSquares
+from casysid.estimation import ErrorsInVariables, LassoRegression, Ridge, StepwiseRegression, WeightedLeastSquares
 from casysid.estimation.base import Estimate, Estimator
 from casysid.estimation.bayesian import BayesianDenoising
 from casysid.identification import Settings, choose_cutoff
 from casysid.identification.coulomb import choose_relative_width
-from casysid.identification.problem import USUAL_WIDTH, LinearProblem, build_problem, coulomb_width
+from casysid.identification.problem import USUAL_WIDTH, LinearProblem, build_problem, coulomb_width, sum_moments
+from casysid.identification.standstill import choose_moving_only
 from casysid.moments import Moments
 from casysid.projection import build_projection, project
 from casysid.recording import Recording
 from casysid.robot import Robot
-from casysid.signals import build_smoother, motion_from_recording
+from casysid.signals import Motion, motion_from_recording, position_noise
 from casysid.simulation import PD, ControlModel, Plant, PlantSettings, Sensing, SimulatedRun, design_sinusoids
 from casysid.validation import hidden_truth, measure_tracking, track, true_coefficients
 
-CUTOFF = 20.0  # [Hz], of the low-pass that all of the paper's methods share: twenty times the fastest sinusoid
+CUTOFF = (
+    20.0  # [Hz], of the spline when the paper's methods are given smoothed motion: twenty times the fastest sinusoid
+)
 SOFT, STIFF = 3.0, 6.0  # [Hz], bandwidth of the feedback where tracking is judged, and in recordings
 PIECES = 8  # recordings, each along sinusoids of its own
+TUNING_PIECES = 2  # are enough to settle a cut-off
 EVALUATION = 20.0  # [s] of each trajectory that is tracked
-STANDING = 0.1  # of the joint's root mean square velocity; and no less than
-STANDING_WIDTHS = 3.0  # widths of Coulomb's smooth sign, which is then within 0.5 % of one
-FEW_ROWS = 100_000  # are as good as all once the low-pass has made neighbours alike
 HAND_TUNED = np.geomspace(1e-8, 1e1, 10)
 
 SENSING = Sensing(position_noise=2e-4, position_resolution=3.8e-4, torque_noise=0.014)
@@ -65,7 +68,7 @@ class Experiment:
         noise: Factor on every sensor's noise and resolution.
         paper_features: Ten inertial parameters and viscous friction a joint, as in the paper; else Coulomb friction,
             offset and armature too.
-        moving: Whether the paper's methods, too, are spared the samples at which a joint stands.
+        smoothed: Whether the paper's methods are given motion from a spline instead of differences.
     """
 
     robot: str
@@ -75,20 +78,19 @@ class Experiment:
     seed: int
     noise: float = 1.0
     paper_features: bool = False
-    moving: bool = False
+    smoothed: bool = False
 
     @property
-    def friction(self) -> tuple[FrictionColumn, ...]:
-        """The regressor's drive columns."""
-        return (Viscous(),) if self.paper_features else DEFAULT_FRICTION
+    def settings(self) -> Settings:
+        """The regressor's drive columns; one thread, for processes run beside each other."""
+        return Settings(friction=(Viscous(),) if self.paper_features else DEFAULT_FRICTION, threads=1)
 
     def build_plant(self) -> Plant:
         """The machine, its sensors as noisy as asked for."""
         names = ("position_noise", "position_resolution", "torque_noise", "torque_resolution")
         louder = {name: self.noise * getattr(SENSING, name) for name in names}
         settings = PlantSettings(sensing=dataclasses.replace(SENSING, **louder))
-        robot = Robot.from_file(find_model(f"{self.robot}.xml"))
-        return Plant(robot, settings, hidden_truth(robot, settings.mechanics, self.seed))
+        return dataclasses.replace(build_machine(self.robot, self.seed), settings=settings)
 
     def follow(
         self, plant: Plant, model: ControlModel, duration: float, motion: int, bandwidth: float = SOFT
@@ -96,8 +98,28 @@ class Experiment:
         """Computed torque along the motion of that number; the gains are the same whatever the model."""
         seed = 1000 * self.seed + motion
         trajectory = design_sinusoids(plant.robot, duration=duration, seed=seed)
-        gains = PD.tuned(plant.robot, plant.parameters, bandwidth=bandwidth)
+        gains = tune(self.robot, self.seed, bandwidth)
         return track(plant, model, gains, trajectory, rate=self.rate, duration=duration, seed=seed)
+
+
+@functools.cache
+def build_machine(robot: str, seed: int) -> Plant:
+    """A machine that differs from its model file, with the usual sensors; built once in each process."""
+    settings, model = PlantSettings(), Robot.from_file(find_model(f"{robot}.xml"))
+    return Plant(model, settings, hidden_truth(model, settings.mechanics, seed))
+
+
+@functools.cache
+def tune(robot: str, seed: int, bandwidth: float) -> PD:
+    """Gains as one would have tuned them on the machine."""
+    plant = build_machine(robot, seed)
+    return PD.tuned(plant.robot, plant.parameters, bandwidth=bandwidth)
+
+
+@functools.cache
+def believe(robot: str, seed: int) -> ControlModel:
+    """What the model file says, before anything is identified."""
+    return ControlModel.from_robot(build_machine(robot, seed).robot)
 
 
 @dataclass(frozen=True)
@@ -114,42 +136,128 @@ def record_piece(experiment: Experiment, piece: int, folder: Path) -> Path:
     count = experiment.samples * experiment.stride // PIECES
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CasysidWarning)
-        run = experiment.follow(plant, ControlModel.from_robot(plant.robot), count / experiment.rate, piece, STIFF)
-    rows = slice(None, None, experiment.stride)
+        model = believe(experiment.robot, experiment.seed)
+        run = experiment.follow(plant, model, count / experiment.rate, piece, STIFF)
+    log, rows = run.recording, slice(None, None, experiment.stride)
+    signals = {"position": log.position, "torque": log.torque}
+    noise = position_noise(log.time, log.position)  # type: ignore[arg-type]
+    for name, values in differentiate(log.position, log.torque, experiment.rate).items():
+        signals[f"filtered_{name}"] = values
     path = folder / f"{experiment.robot}-{experiment.seed}-{experiment.noise:g}-{piece}.npz"
-    log = run.recording
-    np.savez(path, time=log.time[rows], position=log.position[rows], torque=log.torque[rows])
+    np.savez(path, time=log.time[rows], noise=noise, **{name: values[rows] for name, values in signals.items()})
     return path
+
+
+def differentiate(position: Array, torque: Array, rate: float) -> dict[str, Array]:
+    """Positions, their backward differences and those of these, and torques, all twice behind the same low-pass."""
+    velocity = np.diff(position, axis=0, prepend=position[:1]) * rate
+    acceleration = np.diff(velocity, axis=0, prepend=velocity[:1]) * rate
+    signals = {"position": position, "velocity": velocity, "acceleration": acceleration, "torque": torque}
+    return {name: _low_pass(_low_pass(values, rate), rate) for name, values in signals.items()}
+
+
+def _low_pass(values: Array, rate: float) -> Array:
+    """The first-order low-pass of the controller's velocity, at rest at first."""
+    gain = 1.0 - np.exp(-2.0 * np.pi * SENSING.velocity_cutoff / rate)
+    return np.asarray(lfilter([gain], [1.0, gain - 1.0], values - values[0], axis=0) + values[0])
+
+
+def filter_gain(rate: float) -> float:
+    """Standard deviation of such a velocity for white noise of unit variance on positions [1/s]."""
+    impulse = np.zeros((1000, 1))
+    impulse[1] = 1.0
+    return float(np.linalg.norm(differentiate(impulse, impulse, rate)["velocity"]))
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """The recordings of one experiment, read when they are needed."""
+
+    experiment: Experiment
+    plant: Plant
+    pieces: Sequence[Path]
+
+    @cached_property
+    def tuning(self) -> SimulatedRun:
+        """A motion that is neither fitted nor judged."""
+        model = believe(self.experiment.robot, self.experiment.seed)
+        return self.experiment.follow(self.plant, model, EVALUATION, 500)
+
+    @cached_property
+    def paper(self) -> LinearProblem:
+        """What the paper's methods see."""
+        if self.experiment.smoothed:
+            problem = build_problem(self.plant.robot, self._positions(), CUTOFF, self.experiment.settings)
+            return dataclasses.replace(problem, motions=())
+        settings, motions = self.experiment.settings, [self._logged(path) for path in self.pieces]
+        width = tuple(coulomb_width(motions, USUAL_WIDTH).tolist())
+        friction = tuple(
+            dataclasses.replace(column, width=width) if isinstance(column, Coulomb) else column
+            for column in settings.friction
+        )
+        regressor = build_regressor(self.plant.robot, friction=friction)
+        moments = sum_moments(regressor, motions, None, settings)
+        grown = [
+            sum_moments(regressor, [self._disturbed(motion, sign) for motion in motions], None, settings).gram
+            for sign in (1.0, -1.0)
+        ]
+        noise = 0.5 * (grown[0] + grown[1]) - moments.gram
+        return LinearProblem(regressor, (), dataclasses.replace(moments, noise=noise), None)
+
+    def _logged(self, path: Path) -> Motion:
+        """The signals as the paper's authors had them."""
+        robot = self.plant.robot
+        with np.load(path) as data:
+            signals = {name.removeprefix("filtered_"): data[name] for name in data if name.startswith("filtered_")}
+            log = Recording(channels=robot.channels, dofs=robot.dofs, time=data["time"], **signals)
+            velocity_noise = filter_gain(self.experiment.rate) * data["noise"]
+        return dataclasses.replace(motion_from_recording(robot, log, None), velocity_noise=velocity_noise)
+
+    def _disturbed(self, motion: Motion, sign: float) -> Motion:
+        """The same motion with the encoders' noise once more, behind the same filters."""
+        stride, rate = self.experiment.stride, self.experiment.rate
+        sigma = motion.velocity_noise / filter_gain(rate)
+        noise = sign * sigma * np.random.default_rng(len(motion)).normal(size=(stride * len(motion), len(sigma)))
+        added = {name: values[::stride] for name, values in differentiate(noise, noise, rate).items()}
+        q, v, a = motion.q + added["position"], motion.v + added["velocity"], motion.a + added["acceleration"]
+        return dataclasses.replace(motion, q=q, v=v, a=a)
+
+    @cached_property
+    def own(self) -> LinearProblem:
+        """What casysid makes of the recordings; its settings are settled on a few of them."""
+        robot, settings, recordings = self.plant.robot, self.experiment.settings, self._positions()
+        few = recordings[:TUNING_PIECES]
+        cutoff = choose_cutoff(robot, few, settings).cutoff
+        moving_only = choose_moving_only(robot, few, cutoff, settings)
+        width = choose_relative_width(robot, few, cutoff, settings, moving_only)
+        problem = build_problem(robot, recordings, cutoff, settings, relative_width=width, moving_only=moving_only)
+        return dataclasses.replace(problem, motions=())
+
+    def _positions(self) -> list[Recording]:
+        robot, recordings = self.plant.robot, []
+        for path in self.pieces:
+            with np.load(path) as data:
+                logged = {name: data[name] for name in ("time", "position", "torque")}
+                recordings.append(Recording(channels=robot.channels, dofs=robot.dofs, **logged))
+        return recordings
 
 
 def evaluate(experiment: Experiment, pieces: Sequence[Path]) -> Outcome:
     """Every method on the recordings, and how the machine tracks with what it found."""
     warnings.simplefilter("ignore", CasysidWarning)  # weak answers are what the tables show
-    plant = experiment.build_plant()
-    recordings = [_read(plant.robot, path) for path in pieces]
-    settings = Settings(friction=experiment.friction, threads=1)
-    problem = build_problem(plant.robot, recordings, CUTOFF, settings)
-    moments = moving_moments(problem, recordings, CUTOFF) if experiment.moving else problem.moments
-    problem = dataclasses.replace(
-        problem, motions=(), moments=moments
-    )  # the moments are all that is needed from here on
-    tuning = experiment.follow(plant, ControlModel.from_robot(plant.robot), EVALUATION, 500)
-    models: dict[str, ControlModel | None] = {}
+    recorded = Recorded(experiment, experiment.build_plant(), pieces)
+    measures: dict[str, Mapping[str, float]] = {}
     remarks: dict[str, str] = {}
     for name, fit in METHODS.items():
+        model: ControlModel | None = None
         try:
-            model, remark = fit(problem, plant, recordings, tuning)
+            model, remark = fit(recorded)
         except CasysidError as error:
-            model, remark = None, f"{type(error).__name__}: {error}"
-        models[name] = model
+            remark = f"{type(error).__name__}: {error}"
+        measures[name] = _measure(experiment, recorded.plant, model)
         if remark:
             remarks[name] = remark
-    return Outcome({name: _measure(experiment, plant, model) for name, model in models.items()}, remarks)
-
-
-def _read(robot: Robot, path: Path) -> Recording:
-    with np.load(path) as data:
-        return Recording(channels=robot.channels, dofs=robot.dofs, **data)
+    return Outcome(measures, remarks)
 
 
 def _measure(experiment: Experiment, plant: Plant, model: ControlModel | None) -> Mapping[str, float]:
@@ -162,8 +270,8 @@ def _measure(experiment: Experiment, plant: Plant, model: ControlModel | None) -
         return dict.fromkeys(("position", "velocity", "feedback"), FAILURE)
 
 
-Fitted = tuple[ControlModel | None, str]
-Method = Callable[[LinearProblem, Plant, Sequence[Recording], SimulatedRun], Fitted]
+Fitted = tuple[ControlModel, str]
+Method = Callable[[Recorded], Fitted]
 
 
 def project_estimate(regressor: Regressor, moments: Moments, estimate: Estimate) -> ControlModel:
@@ -179,10 +287,11 @@ def project_estimate(regressor: Regressor, moments: Moments, estimate: Estimate)
     return ControlModel(regressor, answer.parameters)
 
 
-def by_estimator(estimator: Estimator) -> Method:
-    """An estimator without prior, then the projection."""
+def of_paper(estimator: Estimator) -> Method:
+    """An estimator without prior on what the paper's methods see; then the projection."""
 
-    def fit(problem: LinearProblem, plant: Plant, recordings: Sequence[Recording], tuning: SimulatedRun) -> Fitted:
+    def fit(recorded: Recorded) -> Fitted:
+        problem = recorded.paper
         estimate = estimator.estimate(problem.moments)
         figures = ", ".join(f"{name} {value:.3g}" for name, value in estimate.diagnostics.items())
         return project_estimate(problem.regressor, problem.moments, estimate), f"{estimate.status.value}; {figures}"
@@ -190,86 +299,51 @@ def by_estimator(estimator: Estimator) -> Method:
     return fit
 
 
-def hand_tuned_ridge(
-    problem: LinearProblem, plant: Plant, recordings: Sequence[Recording], tuning: SimulatedRun
-) -> Fitted:
+def hand_tuned_ridge(recorded: Recorded) -> Fitted:
     """The strength that predicts the *true* torque of another motion best: no hand does better."""
-    best, chosen, least = None, float("nan"), np.inf
+    problem, run = recorded.paper, recorded.tuning
+    found = []
     for strength in HAND_TUNED:
         model = project_estimate(problem.regressor, problem.moments, Ridge(strength).estimate(problem.moments))
-        predicted = model.inverse_dynamics(tuning.q, tuning.v, tuning.a)
-        error = float(np.mean(np.sqrt(np.mean((predicted - tuning.tau) ** 2, axis=0))))
-        if error < least:
-            best, chosen, least = model, strength, error
-    return best, f"strength {chosen:.1e}"
+        predicted = model.inverse_dynamics(run.q, run.v, run.a)
+        found.append((float(np.mean(np.sqrt(np.mean((predicted - run.tau) ** 2, axis=0)))), strength, model))
+    _, strength, model = min(found, key=lambda one: one[0])
+    return model, f"strength {strength:.1e}"
 
 
-def beyond(estimator: Estimator) -> Method:
-    """An estimator with the file's prior, the data's filter and moving joints alone; then the projection."""
+def of_casysid(estimator: Estimator) -> Method:
+    """An estimator with the file's prior on casysid's own equations; then the projection."""
 
-    def fit(problem: LinearProblem, plant: Plant, recordings: Sequence[Recording], tuning: SimulatedRun) -> Fitted:
-        settings = Settings(friction=problem_friction(problem), threads=1)
-        few = recordings[:2]
-        cutoff = choose_cutoff(plant.robot, few, settings).cutoff
-        width = choose_relative_width(plant.robot, few, cutoff, settings)
-        own = build_problem(plant.robot, recordings, cutoff, settings, relative_width=width)
-        moments = moving_moments(own, recordings, cutoff)
-        estimate = estimator.estimate(moments, own.regressor.prior)
-        return project_estimate(own.regressor, moments, estimate), f"cut-off {cutoff:.3g} Hz"
+    def fit(recorded: Recorded) -> Fitted:
+        problem = recorded.own
+        estimate = estimator.estimate(problem.moments, problem.regressor.prior)
+        return project_estimate(problem.regressor, problem.moments, estimate), f"cut-off {problem.cutoff:.3g} Hz"
 
     return fit
 
 
-def moving_moments(problem: LinearProblem, recordings: Sequence[Recording], cutoff: float | None) -> Moments:
-    """Moments of a problem's regressor, each joint's equations only from samples at which it moves."""
-    regressor = problem.regressor
-    motions = [motion_from_recording(regressor.robot, recording, cutoff) for recording in recordings]
-    standing = np.maximum(STANDING_WIDTHS * coulomb_width(motions, USUAL_WIDTH), coulomb_width(motions, STANDING))
-    stride = max(1, sum(map(len, motions)) // FEW_ROWS)
-    parts = []
-    for motion, recording in zip(motions, recordings, strict=True):
-        torque = recording.torque
-        if cutoff is not None:
-            torque = build_smoother(motion.time, cutoff).smooth(torque)
-        q, v, a, tau = (x[::stride] for x in (motion.q, motion.v, motion.a, torque))
-        p, dofs = len(regressor.names), regressor.robot.dofs
-        gram, count = np.zeros((4, len(dofs), p + 1, p + 1)), np.zeros((4, len(dofs)))
-        for k in range(len(dofs)):
-            moving = np.abs(v[:, k]) > standing[k]
-            if moving.sum() >= len(gram):  # else the joint stood all the time
-                part = accumulate_moments(regressor, q, v, a, tau, valid=moving, blocks=len(gram), threads=1)
-                gram[:, k], count[:, k] = part.gram[:, k], part.count[:, k]
-        parts.append(Moments(gram, count, regressor.names, dofs))
-    return functools.reduce(operator.add, parts)
-
-
-def problem_friction(problem: LinearProblem) -> tuple[FrictionColumn, ...]:
-    """The kinds of drive columns that a problem has."""
-    kinds = {one.kind for one in problem.regressor.parameters}
-    return tuple(column for column in DEFAULT_FRICTION if column.kind in kinds)
-
-
-def file_parameters(
-    problem: LinearProblem, plant: Plant, recordings: Sequence[Recording], tuning: SimulatedRun
-) -> Fitted:
+def file_parameters(recorded: Recorded) -> Fitted:
     """What the model file says."""
-    return ControlModel(problem.regressor, problem.regressor.prior), ""
+    regressor = recorded.paper.regressor
+    return ControlModel(regressor, regressor.prior), ""
 
 
-def true_parameters(
-    problem: LinearProblem, plant: Plant, recordings: Sequence[Recording], tuning: SimulatedRun
-) -> Fitted:
+def true_parameters(recorded: Recorded) -> Fitted:
     """The machine's own parameters."""
-    return ControlModel(problem.regressor, true_coefficients(plant, problem.regressor)), ""
+    regressor = recorded.paper.regressor
+    return ControlModel(regressor, true_coefficients(recorded.plant, regressor)), ""
 
 
 METHODS: dict[str, Method] = {
-    "Bayesian de-noising": by_estimator(BayesianDenoising()),
-    "ridge (cross-validated)": by_estimator(Ridge()),
+    "Bayesian de-noising": of_paper(BayesianDenoising()),
+    "ridge (cross-validated)": of_paper(Ridge()),
     "ridge (hand-tuned)": hand_tuned_ridge,
-    "LASSO": by_estimator(LassoRegression()),
-    "stepwise": by_estimator(StepwiseRegression()),
-    "weighted least squares, own filter": beyond(WeightedLeastSquares()),
+    "LASSO": of_paper(LassoRegression()),
+    "stepwise": of_paper(StepwiseRegression()),
+    "Bayesian de-noising, encoder noise": of_paper(ErrorsInVariables(BayesianDenoising())),
+    "errors in variables": of_paper(ErrorsInVariables()),
+    "weighted least squares, own filter": of_casysid(WeightedLeastSquares()),
+    "errors in variables, own filter": of_casysid(ErrorsInVariables()),
     "model file": file_parameters,
     "true parameters": true_parameters,
 }
