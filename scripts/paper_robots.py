@@ -324,13 +324,12 @@ def of_casysid(estimator: Estimator) -> Method:
 
 def file_parameters(recorded: Recorded) -> Fitted:
     """What the model file says."""
-    regressor = recorded.paper.regressor
-    return ControlModel(regressor, regressor.prior), ""
+    return believe(recorded.experiment.robot, recorded.experiment.seed), ""
 
 
 def true_parameters(recorded: Recorded) -> Fitted:
-    """The machine's own parameters."""
-    regressor = recorded.paper.regressor
+    """The machine's own parameters; of what it does, springs, lag and stiction have no column."""
+    regressor = believe(recorded.experiment.robot, recorded.experiment.seed).regressor
     return ControlModel(regressor, true_coefficients(recorded.plant, regressor)), ""
 
 
