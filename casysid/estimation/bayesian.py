@@ -10,7 +10,8 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.errors import ParameterError
 from casysid.estimation.denoising_em import GammaPrior
-from casysid.estimation.denoising_estimate import DenoisingEstimator, Scale
+from casysid.estimation.denoising_estimate import DenoisingEstimator
+from casysid.estimation.denoising_fit import Scale
 from casysid.estimation.selection import mean_variance
 from casysid.estimation.standardise import StandardisedProblem, seen_directions
 
@@ -24,9 +25,10 @@ SMALLEST_RESIDUAL = 1e-12
 class BayesianDenoising(DenoisingEstimator):
     """Regression that takes input and output for noisy and finds out which columns matter.
 
-    Second moments do not say how much of a column is noise: prior and start do. The output is measured in units in
-    which every weight that the data can tell from zero is large beside the input weights; then the prior's idea of the
-    noise is the same for weak and strong columns, and the start hardly matters.
+    The model finds the noisy vector and which columns matter. Its output is measured in units in which every weight
+    that the data can tell from zero is large beside the input weights; then the prior's idea of the noise is the same
+    for weak and strong columns, and the start hardly matters. How much of the relevant columns is noise, and with it
+    the noiseless vector, follows from the data's own correlations (:mod:`casysid.estimation.denoising_fit`).
 
     Attributes:
         prior: Of the precisions α of the weights.

@@ -1,7 +1,8 @@
 """Bayesian de-noising regression and Joint Factor Analysis of one regression problem, from its moments.
 
 The likelihood is flat along ``wx² + ψx = const``, ``wx wz = const``: how much of a column is noise is decided by start
-and prior, not by second moments. A few starts are run and the one of the largest bound is kept.
+and prior, for the model takes the noiseless columns for independent (:mod:`casysid.estimation.noise_split` does not).
+A few starts are run and the one of the largest bound is kept.
 
 The prior must not tie a column's noise to its strength. It does where ``wz`` is small beside ``wx ≤ 1``: there it makes
 weak columns nearly pure noise and blows up their weights. Given an output so large that every weight the data can tell

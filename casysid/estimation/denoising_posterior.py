@@ -71,13 +71,8 @@ class DenoisingPosterior:
 
         That is zero where a column is switched off; as printed, Eq. (4) collapses to ``wz / wx``, which is 0/0 there.
         """
-        return self.noiseless_regression_within(np.full_like(self.input_noise, np.inf))
-
-    def noiseless_regression_within(self, largest_noise: Array) -> Array:
-        """``b_true`` if no column m can have more noise than ``largest_noise[m]``."""
         square = self.input_weight**2 + self.input_weight_variance
-        signal = np.maximum(square, self.mean_square - largest_noise)
-        return frozen(self.output_weight * self.input_weight / signal)
+        return frozen(self.output_weight * self.input_weight / square)
 
     @property
     def noise_fraction(self) -> Array:

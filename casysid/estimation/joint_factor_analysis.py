@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from casysid.estimation.denoising import Start
-from casysid.estimation.denoising_estimate import DenoisingEstimator, Scale
+from casysid.estimation.denoising_estimate import DenoisingEstimator
+from casysid.estimation.denoising_fit import Scale
 from casysid.estimation.standardise import StandardisedProblem
 
 

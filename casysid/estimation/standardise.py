@@ -7,6 +7,7 @@ left is a plain regression problem without units, ``β`` explaining a target of 
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -60,6 +61,12 @@ class StandardisedProblem:
     def is_degenerate(self) -> bool:
         """Nothing to estimate: no column has energy, or the prior leaves nothing to explain."""
         return len(self.live) == 0 or self.target_rms == 0.0
+
+    def restricted_to(self, columns: npt.NDArray[np.intp]) -> StandardisedProblem:
+        """The same with some of the d columns only; the others stay at the prior."""
+        kept = np.append(columns, len(self.live))
+        gram = frozen(self.gram[:, kept[:, None], kept])
+        return dataclasses.replace(self, gram=gram, live=self.live[columns], scale=frozen(self.scale[columns]))
 
     def normal_of(self, blocks: npt.ArrayLike) -> NormalEquations:
         """The given blocks only, still divided by the number of all rows."""
