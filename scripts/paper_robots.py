@@ -22,14 +22,14 @@ from scipy.signal import lfilter
 
 from casysid.arrays import Array
 from casysid.bundled import find_model
-from casysid.dynamics import DEFAULT_FRICTION, Coulomb, Regressor, Viscous, build_regressor
+from casysid.dynamics import DEFAULT_FRICTION, Regressor, Viscous, build_regressor
 from casysid.errors import CasysidError, CasysidWarning
 from casysid.estimation import ErrorsInVariables, LassoRegression, Ridge, StepwiseRegression, WeightedLeastSquares
 from casysid.estimation.base import Estimate, Estimator
 from casysid.estimation.bayesian import BayesianDenoising
 from casysid.identification import Settings, choose_cutoff
 from casysid.identification.coulomb import choose_relative_width
-from casysid.identification.problem import USUAL_WIDTH, LinearProblem, build_problem, coulomb_width, sum_moments
+from casysid.identification.problem import USUAL_WIDTH, LinearProblem, build_problem, sum_moments, with_widths
 from casysid.identification.standstill import choose_moving_only
 from casysid.moments import Moments
 from casysid.projection import build_projection, project
@@ -190,12 +190,7 @@ class Recorded:
             problem = build_problem(self.plant.robot, self._positions(), CUTOFF, self.experiment.settings)
             return dataclasses.replace(problem, motions=())
         settings, motions = self.experiment.settings, [self._logged(path) for path in self.pieces]
-        width = tuple(coulomb_width(motions, USUAL_WIDTH).tolist())
-        friction = tuple(
-            dataclasses.replace(column, width=width) if isinstance(column, Coulomb) else column
-            for column in settings.friction
-        )
-        regressor = build_regressor(self.plant.robot, friction=friction)
+        regressor = build_regressor(self.plant.robot, friction=with_widths(settings, motions, USUAL_WIDTH))
         moments = sum_moments(regressor, motions, None, settings)
         grown = [
             sum_moments(regressor, [self._disturbed(motion, sign) for motion in motions], None, settings).gram
