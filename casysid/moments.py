@@ -53,6 +53,7 @@ class Moments:
         columns: Names of the p regressor columns.
         joints: Names of the degrees of freedom whose torque rows were summed.
         noise: What errors of the measured motion have added to ``gram``, same shape; None when that is not known.
+        noise_error: Standard error of ``noise`` as a whole, as a fraction of it: the noise's level is itself estimated.
     """
 
     gram: Array
@@ -60,6 +61,7 @@ class Moments:
     columns: tuple[str, ...]
     joints: tuple[str, ...]
     noise: Array | None = None
+    noise_error: float = 0.0
 
     def __post_init__(self) -> None:
         gram, count = np.asarray(self.gram, dtype=np.float64), np.asarray(self.count, dtype=np.float64)
@@ -109,6 +111,7 @@ class Moments:
             self.columns,
             self.joints,
             np.concatenate([self.noise, other.noise]) if known else None,
+            max(self.noise_error, other.noise_error),
         )
 
     @property
@@ -120,12 +123,12 @@ class Moments:
         """The given blocks only (indices or a boolean mask)."""
         chosen = np.asarray(blocks)
         noise = None if self.noise is None else self.noise[chosen]
-        return Moments(self.gram[chosen], self.count[chosen], self.columns, self.joints, noise)
+        return Moments(self.gram[chosen], self.count[chosen], self.columns, self.joints, noise, self.noise_error)
 
     def shifted(self, parameters: Array) -> Moments:
         """The moments of ``[x, y - xᵀθ0]``: what is left to explain beside ``parameters`` θ0, shape (p,)."""
         noise = None if self.noise is None else _shift(self.noise, parameters)
-        return Moments(_shift(self.gram, parameters), self.count, self.columns, self.joints, noise)
+        return Moments(_shift(self.gram, parameters), self.count, self.columns, self.joints, noise, self.noise_error)
 
     def denoised(self, share: float = 1.0) -> Moments:
         """The moments less ``share`` of what noise has added, perhaps indefinite; unchanged when that is not known."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from casysid.cli.options import (
+    AccelerationNoiseOption,
     ConsistencyChoice,
     ConsistencyOption,
     CouplingOption,
@@ -19,12 +20,15 @@ from casysid.cli.options import (
     HeldOutOption,
     LockOption,
     LogsArgument,
+    PositionNoiseOption,
     RobotArgument,
     SplitOption,
     TimeScaleOption,
+    VelocityNoiseOption,
     load_recordings,
     load_robot,
     make_settings,
+    noise_levels,
 )
 
 if TYPE_CHECKING:
@@ -44,6 +48,9 @@ def identify(
     time_scale: TimeScaleOption = None,
     delay: DelayOption = "auto",
     coupling: CouplingOption = None,
+    noise_position: PositionNoiseOption = None,
+    noise_velocity: VelocityNoiseOption = None,
+    noise_acceleration: AccelerationNoiseOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
     floating_base: FloatingOption = False,
@@ -63,7 +70,8 @@ def identify(
         from casysid.identification.output import write_result
         from casysid.report import write_report
 
-        settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay)
+        noise = noise_levels(noise_position, noise_velocity, noise_acceleration)
+        settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise)
         model = load_robot(robot, gravity, lock, floating_base)
         fitted, unseen = load_recordings(model, logs, held_out, split)
         with progress_bar(console) as progress:
@@ -80,7 +88,7 @@ def identify(
 def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> None:
     from casysid.cli.console import rich_table
     from casysid.identification.verdict import judge
-    from casysid.report import drive_table, error_table, link_table
+    from casysid.report import drive_table, error_table, link_table, noise_table
 
     for title, table in (
         ("Torque error", error_table(result)),
@@ -90,6 +98,9 @@ def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...
         console.print(rich_table(title, table.header, table.rows))
         console.print()
     console.print(f"torque delay: {result.delay.reason}", markup=False, soft_wrap=True)
+    if noise := noise_table(result):
+        console.print(rich_table("Noise of the measured motion", noise.header, noise.rows))
+        console.print()
     verdict = judge(result)
     console.print(f"[bold {'green' if verdict.accepted else 'red'}]{verdict.headline}[/]")
     for line in (*verdict.reasons, *verdict.remarks, *notes):

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from casysid.identification import Settings
     from casysid.recording import Recording
     from casysid.robot import Robot
+    from casysid.signals import NoiseLevels
 
 
 class ConsistencyChoice(enum.StrEnum):
@@ -46,6 +47,22 @@ DelayOption = Annotated[
 CouplingOption = Annotated[
     list[str] | None,
     typer.Option(metavar="JOINT+JOINT", help="A motor that turns with the sum of two joints' motions. Repeatable."),
+]
+PositionNoiseOption = Annotated[
+    str | None,
+    typer.Option(
+        "--noise-position", metavar="STD[,STD...]", help="Of the positions' sensors [rad, m]; default: from the data."
+    ),
+]
+VelocityNoiseOption = Annotated[
+    str | None,
+    typer.Option(
+        "--noise-velocity", metavar="STD[,STD...]", help="Of velocities taken as logged, without time [rad/s, m/s]."
+    ),
+]
+AccelerationNoiseOption = Annotated[
+    str | None,
+    typer.Option("--noise-acceleration", metavar="STD[,STD...]", help="Of accelerations likewise [rad/s², m/s²]."),
 ]
 GravityOption = Annotated[
     tuple[float, float, float] | None,
@@ -85,6 +102,31 @@ def load_recordings(
     return [first for first, _ in halves], [second for _, second in halves] + unseen
 
 
+def noise_levels(position: str | None, velocity: str | None, acceleration: str | None) -> NoiseLevels:
+    """Sensors' noise from the command line's words: one number for all, or one for each separated by commas."""
+    from casysid.signals import NoiseLevels
+
+    return NoiseLevels(
+        position=_numbers("--noise-position", position),
+        velocity=_numbers("--noise-velocity", velocity),
+        acceleration=_numbers("--noise-acceleration", acceleration),
+    )
+
+
+def _numbers(option: str, text: str | None) -> float | tuple[float, ...] | None:
+    from casysid.errors import ParameterError
+
+    if text is None:
+        return None
+    try:
+        values = tuple(float(word) for word in text.split(","))
+    except ValueError as error:
+        raise ParameterError(
+            f"{option} wants a number, or one for each separated by commas, such as 1e-4,2e-4; got {text!r}"
+        ) from error
+    return values[0] if len(values) == 1 else values
+
+
 def make_settings(
     method: str,
     consistency: ConsistencyChoice,
@@ -92,12 +134,14 @@ def make_settings(
     couplings: list[str] | None,
     time_scale: float | None = None,
     delay: str = "auto",
+    input_noise: NoiseLevels | None = None,
 ) -> Settings:
     """Settings from the command line's words."""
     from casysid.dynamics import Coupling
     from casysid.estimation import estimator_by_name
     from casysid.identification import Settings
     from casysid.inertia import Consistency
+    from casysid.signals import NoiseLevels
 
     pairs = [tuple(text.split("+")) for text in couplings or []]
     return Settings(
@@ -106,6 +150,7 @@ def make_settings(
         cutoff=cutoff,
         time_scale=time_scale,
         delay=_seconds(delay),
+        input_noise=input_noise or NoiseLevels(),
         couplings=tuple(Coupling(joints=joints, weights=(1.0,) * len(joints)) for joints in pairs),
     )
 

@@ -18,7 +18,14 @@ from casysid.identification.coulomb import choose_relative_width
 from casysid.identification.cutoff import COARSE_STEP, FINE_STEP, CutoffChoice, choose_cutoff
 from casysid.identification.delay import DelayChoice, choose_delay, given_delay
 from casysid.identification.prediction import torque_error
-from casysid.identification.problem import USUAL_WIDTH, LinearProblem, Mask, build_problem, make_motion
+from casysid.identification.problem import (
+    USUAL_WIDTH,
+    LinearProblem,
+    Mask,
+    build_problem,
+    make_motion,
+    position_smoothing,
+)
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 from casysid.identification.standstill import choose_moving_only
@@ -115,7 +122,10 @@ def prepare(
     clock.lap("tuning")
     progress("moments", 0.0)
     problem = build_problem(robot, fitted, cutoff.cutoff, settings, relative_width=width, moving_only=moving_only)
-    predicted = tuple(make_motion(robot, recording, cutoff.cutoff) for recording in unseen)
+    predicted = tuple(
+        make_motion(robot, one, cutoff.cutoff, smoothing=position_smoothing(one, cutoff.cutoff, settings))
+        for one in unseen
+    )
     structural = structural_base_parameters(problem.regressor)
     clock.lap("moments")
     progress("moments", 1.0)
@@ -154,6 +164,7 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
         file=torque_error(regressor, regressor.prior, judged, band),
         train_motions=problem.motions,
         held_out_motions=preparation.held_out,
+        input_noise=problem.input_noise,
         seconds={**preparation.seconds, **clock.laps},
     )
     progress("check", 1.0)

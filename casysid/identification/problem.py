@@ -2,9 +2,9 @@
 
 Two low-passes share one cut-off. Positions are smoothed at twice it before they are differentiated, so that no motion
 is lost; the equations ``tau = Y θ`` are then averaged, both sides alike, up to it. What the encoders' noise adds to the
-moments is found by adding as much noise once more, with both signs, to the logged positions, and going the same way
-again: simulation-extrapolation (Cook and Stefanski 1994) with antithetic noise. It holds for every joint type and
-regressor, and the noise has the colour that smoothing gives it.
+moments is found by adding as much noise once more to the logged positions and going the same way again
+(:mod:`casysid.identification.noise_moments`). Noise so heavy that smoothing at twice the cut-off would let more of it
+pass than it keeps of the motion, is smoothed lower.
 """
 
 from __future__ import annotations
@@ -19,16 +19,28 @@ import numpy.typing as npt
 from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
 from casysid.dynamics import Coulomb, FrictionColumn, Regressor, build_regressor
+from casysid.estimation import ErrorsInVariables
+from casysid.identification.noise_moments import noise_moments
 from casysid.identification.settings import Settings
 from casysid.moments import Moments
 from casysid.recording import Recording
 from casysid.robot import Robot
-from casysid.signals import BandAverage, Motion, disturbed, motion_from_recording, position_noise
+from casysid.signals import (
+    BandAverage,
+    InputNoise,
+    Motion,
+    find_input_noise,
+    mean_input_noise,
+    motion_from_recording,
+    smoothing_cutoff,
+)
 
 MOTION_TO_TORQUE_BAND = 2.0
 """Cut-off of the positions' smoothing over that of the equations' average."""
-WIDTH_IN_NOISE = 3.0
+WIDTH_IN_NOISE = 2.0
 """Coulomb's smooth sign turns within no less than this many standard deviations of the velocity's noise."""
+WIDTH_IN_GIVEN_NOISE = 0.3
+"""And of the given noise of logged velocities, which extrapolation takes out of a sharper sign as well."""
 USUAL_WIDTH = 5e-3
 """And, before the data have chosen, within this fraction of the root mean square velocity."""
 MINIMUM_BLOCKS = 4
@@ -47,12 +59,14 @@ class LinearProblem:
         motions: The smoothed recordings, marked as standing where equations are left out.
         moments: Sums over all of them, in blocks of time.
         cutoff: Of the equations' average [Hz]; None when they are taken as they are.
+        input_noise: Of the measured motion, over all recordings; None where it is not known or not asked for.
     """
 
     regressor: Regressor
     motions: tuple[Motion, ...]
     moments: Moments
     cutoff: float | None
+    input_noise: InputNoise | None = None
 
 
 def build_problem(
@@ -77,37 +91,82 @@ def build_problem(
             freedom.
         quick: Decimate, and leave out what noise adds: for trials.
     """
-    motions = tuple(make_motion(robot, recording, cutoff, quick=quick) for recording in recordings)
+    motions = tuple(
+        make_motion(robot, recording, cutoff, smoothing=position_smoothing(recording, cutoff, settings), quick=quick)
+        for recording in recordings
+    )
     motions = tuple(dataclasses.replace(motion, standing=motion.standing & moving_only) for motion in motions)
-    friction = with_widths(settings, motions, relative_width)
+    noise = () if quick else tuple(_input_noise(recording, cutoff, settings) for recording in recordings)
+    input_noise = mean_input_noise(noise)
+    friction = with_widths(settings, motions, relative_width, input_noise)
     regressor = build_regressor(
         robot, friction=friction, couplings=settings.couplings, quasi_static=bool(settings.quasi_static)
     )
     moments = sum_moments(regressor, motions, cutoff, settings)
-    if not (quick or cutoff is None):
-        noise = _noise_moments(regressor, recordings, motions, moments, cutoff, settings)
-        moments = dataclasses.replace(moments, noise=noise)
-    return LinearProblem(regressor, motions, moments, cutoff)
+    if input_noise is not None:
+
+        def sums_of(disturbed: Sequence[Recording]) -> Array:
+            noisier = [
+                dataclasses.replace(
+                    make_motion(robot, recording, cutoff, smoothing=motion.cutoff), standing=motion.standing
+                )
+                for recording, motion in zip(disturbed, motions, strict=True)  # the same equations, noisier
+            ]
+            return sum_moments(regressor, noisier, cutoff, settings).gram
+
+        added = noise_moments(regressor, recordings, noise, moments.gram, sums_of, as_logged=cutoff is None)
+        moments = dataclasses.replace(moments, noise=added, noise_error=input_noise.relative_error)
+    return LinearProblem(regressor, motions, moments, cutoff, input_noise)
 
 
 def with_widths(
-    settings: Settings, motions: Sequence[Motion], relative_width: float | Array
+    settings: Settings,
+    motions: Sequence[Motion],
+    relative_width: float | Array,
+    input_noise: InputNoise | None = None,
 ) -> tuple[FrictionColumn, ...]:
     """The friction columns asked for, Coulomb's smooth sign as sharp as the motions allow."""
-    width = settings.coulomb_width or tuple(coulomb_width(motions, relative_width).tolist())
+    width = settings.coulomb_width or tuple(coulomb_width(motions, relative_width, input_noise).tolist())
     return tuple(
         dataclasses.replace(column, width=width) if isinstance(column, Coulomb) else column
         for column in settings.friction
     )
 
 
-def make_motion(robot: Robot, recording: Recording, cutoff: float | None, *, quick: bool = False) -> Motion:
-    """A recording smoothed for equations up to ``cutoff`` [Hz]; ``quick`` drops samples far above it."""
+def _input_noise(recording: Recording, cutoff: float | None, settings: Settings) -> InputNoise | None:
+    as_logged = cutoff is None or recording.time is None
+    return find_input_noise(recording, settings.input_noise, as_logged=as_logged)
+
+
+def make_motion(
+    robot: Robot,
+    recording: Recording,
+    cutoff: float | None,
+    *,
+    smoothing: float | None = None,
+    quick: bool = False,
+) -> Motion:
+    """A recording smoothed for equations up to ``cutoff`` [Hz].
+
+    Args:
+        robot: The robot.
+        recording: The recording.
+        cutoff: Of the equations' average [Hz]; None takes the samples as logged.
+        smoothing: Cut-off of the positions [Hz]; None is twice the equations'.
+        quick: Drop samples far above the cut-off.
+    """
     if cutoff is None or recording.time is None:
         return motion_from_recording(robot, recording, None)
-    smoothing = MOTION_TO_TORQUE_BAND * cutoff
-    motion = motion_from_recording(robot, recording, smoothing)
-    return motion.decimated(int(recording.rate / (SAMPLES_PER_PERIOD * smoothing))) if quick else motion
+    highest = MOTION_TO_TORQUE_BAND * cutoff
+    motion = motion_from_recording(robot, recording, highest if smoothing is None else smoothing)
+    return motion.decimated(int(recording.rate / (SAMPLES_PER_PERIOD * highest))) if quick else motion
+
+
+def position_smoothing(recording: Recording, cutoff: float | None, settings: Settings) -> float | None:
+    """Cut-off of the positions' smoothing [Hz]: lower where noise is heavy and the method reckons with noise."""
+    if cutoff is None or recording.time is None or not isinstance(settings.method, ErrorsInVariables):
+        return None
+    return min(MOTION_TO_TORQUE_BAND * cutoff, smoothing_cutoff(recording.time, recording.position))
 
 
 def sum_moments(regressor: Regressor, motions: Sequence[Motion], cutoff: float | None, settings: Settings) -> Moments:
@@ -133,28 +192,12 @@ def sum_moments(regressor: Regressor, motions: Sequence[Motion], cutoff: float |
     return total
 
 
-def _noise_moments(
-    regressor: Regressor,
-    recordings: Sequence[Recording],
-    motions: Sequence[Motion],
-    here: Moments,
-    cutoff: float,
-    settings: Settings,
+def coulomb_width(
+    motions: Sequence[Motion], relative_width: float | Array, input_noise: InputNoise | None = None
 ) -> Array:
-    """By how much moments grow when the encoders' noise is added once more, shape of ``gram``."""
-    grown = []
-    for sign in (1.0, -1.0):
-        noisier = []
-        for seed, (recording, motion) in enumerate(zip(recordings, motions, strict=True)):
-            noise = position_noise(recording.time, recording.position)  # type: ignore[arg-type]
-            noisy = make_motion(regressor.robot, disturbed(recording, noise, sign, seed), cutoff)
-            noisier.append(dataclasses.replace(noisy, standing=motion.standing))  # the same equations
-        grown.append(sum_moments(regressor, noisier, cutoff, settings).gram)
-    return np.asarray(0.5 * (grown[0] + grown[1]) - here.gram)
-
-
-def coulomb_width(motions: Sequence[Motion], relative_width: float | Array) -> Array:
     """Velocity within which each degree of freedom's smooth sign turns, shape (nv,): never sharper than its noise."""
-    noise = np.max([motion.velocity_noise for motion in motions], axis=0)
+    noise = WIDTH_IN_NOISE * np.max([motion.velocity_noise for motion in motions], axis=0)
+    if input_noise is not None:
+        noise = np.maximum(noise, WIDTH_IN_GIVEN_NOISE * input_noise.velocity)
     speed = np.sqrt(np.mean([np.mean(motion.v**2, axis=0) for motion in motions], axis=0))
-    return np.asarray(np.maximum(np.maximum(WIDTH_IN_NOISE * noise, relative_width * speed), 1e-9))
+    return np.asarray(np.maximum(np.maximum(noise, relative_width * speed), 1e-9))

@@ -25,7 +25,7 @@ from casysid.inertia import smallest_eigenvalue
 from casysid.moments import Moments
 from casysid.projection import ProjectionResult
 from casysid.robot import Robot
-from casysid.signals import Motion
+from casysid.signals import InputNoise, Motion
 from casysid.uncertainty import ParameterUncertainty
 
 JOINT_KINDS = ("viscous", "coulomb", "offset", "armature")
@@ -55,6 +55,7 @@ class IdentificationResult:
             ones.
         train_motions: The fitted motions.
         held_out_motions: The motions never fitted.
+        input_noise: Of the measured motion; None where it is not known.
         seconds: Wall time of the stages by name.
     """
 
@@ -76,6 +77,7 @@ class IdentificationResult:
     file: TorqueError
     train_motions: tuple[Motion, ...]
     held_out_motions: tuple[Motion, ...]
+    input_noise: InputNoise | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -200,9 +202,24 @@ class IdentificationResult:
             "friction_decided_by_data": self._by_drive(self.sources.by_data),
             "decided_by_the_file": list(self.sources.of_the_file),
             "degrees_of_freedom": self.uncertainty.freedom,
+            "input_noise": _noise_to_json(self.robot, self.input_noise),
             "diagnostics": dict(self.estimate.diagnostics),
         }
         return content
+
+
+def _noise_to_json(robot: Robot, noise: InputNoise | None) -> dict[str, object] | None:
+    if noise is None:
+        return None
+    by_channel, by_dof = robot.channels, robot.dofs
+    return {
+        "source": noise.source,
+        "position": dict(zip(by_channel, noise.position.tolist(), strict=True)),
+        "resolution": dict(zip(by_channel, noise.resolution.tolist(), strict=True)),
+        "velocity": dict(zip(by_dof, noise.velocity.tolist(), strict=True)),
+        "acceleration": dict(zip(by_dof, noise.acceleration.tolist(), strict=True)),
+        "relative_error": noise.relative_error,
+    }
 
 
 def _projection_to_json(projection: ProjectionResult | None) -> dict[str, object] | None:

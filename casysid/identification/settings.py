@@ -11,6 +11,7 @@ from casysid.errors import ParameterError
 from casysid.estimation import Estimator, Ridge
 from casysid.inertia import Consistency
 from casysid.projection import Knowledge
+from casysid.signals import NoiseLevels
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +30,7 @@ class Settings:
         couplings: Transmissions that link joints, such as a wrist driven by two motors.
         time_scale: Time stamps times this are seconds; None looks whether inertial torques contradict the clock.
         quasi_static: Torques hold no inertial part, gravity and friction explain them; None lets the data decide.
+        input_noise: What is known of the noise of the measured motion; by default the positions' is found in the data.
         blocks: Blocks of time by which moments are kept: the folds of cross-validation and the unit of standard errors.
         threads: Threads of the regressor's evaluation.
     """
@@ -43,6 +45,7 @@ class Settings:
     couplings: tuple[Coupling, ...] = ()
     time_scale: float | None = None
     quasi_static: bool | None = None
+    input_noise: NoiseLevels = field(default_factory=NoiseLevels)
     blocks: int = 20
     threads: int = 2
 

@@ -122,12 +122,6 @@ def stretches(time: Array) -> list[npt.NDArray[np.intp]]:
     return np.split(np.arange(len(time)), gaps)
 
 
-def disturbed(recording: Recording, noise_std: Array, sign: float, seed: int) -> Recording:
-    """The recording with white noise added to its positions once more; ``noise_std`` by channel, shape (n,)."""
-    noise = np.random.default_rng(seed).normal(size=recording.position.shape) * noise_std
-    return dataclasses.replace(recording, position=recording.position + sign * noise)
-
-
 def _as_logged(robot: Robot, recording: Recording) -> Motion:
     if recording.velocity is None or recording.acceleration is None:
         raise RecordingError(

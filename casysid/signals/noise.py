@@ -8,8 +8,16 @@ from scipy.signal import periodogram
 from casysid.arrays import Array
 
 FLOOR_MARGIN = 4.0
-MINIMUM_CHANGES = 50
+MINIMUM_GAPS = 10
 MULTIPLES_THAT_TELL = 9.0
+SPLINE_ORDER = 3
+SAMPLES_PER_PARAMETER = 1e4
+LARGEST_LOSS = 2e-3
+"""Of a motion's accelerations to smoothing."""
+CANDIDATES = 60
+CHANCE_LINES = 3.0
+LOWEST_LINES = 10.0
+"""Lowest candidate for the smoothing, in lines of the spectrum."""
 
 
 def _even_samples(time: Array, position: Array) -> tuple[Array, float]:
@@ -48,19 +56,54 @@ def position_noise(time: Array, position: Array) -> Array:
     return np.asarray(np.maximum(np.sqrt(floor * rate / 2.0), position_resolution(position) / np.sqrt(12.0)))
 
 
+def smoothing_cutoff(time: Array, position: Array) -> float:
+    """Cut-off [Hz] of the smoothing spline that leaves least error in the accelerations, the neediest channel's.
+
+    A low-pass of gain ``g`` biases an inertia by ``b = Σ ω⁴ g (1 - g) S / Σ ω⁴ g² S`` for a motion with spectrum ``S``,
+    and leaves noise of ``r = Σ ω⁴ g² N / Σ ω⁴ S``, which averages out: the least of ``b² + r (1 + r) / n`` is sought
+    where ``b`` is small, n being what the samples are worth to a parameter. The less noise, the higher it is.
+    """
+    even, rate = _even_samples(time, position)
+    frequency, power = periodogram(even, rate, window="hann", detrend="linear", axis=0)
+    floor = np.median(power[len(power) // 2 :], axis=0) / np.log(2.0)
+    fourth = frequency[:, None] ** 4
+    seen = power > (np.log(len(power)) + CHANCE_LINES) * floor  # noise alone does not reach so high
+    motion = np.where(seen, power - floor, 0.0) * fourth
+    motion[len(power) // 2 :] = 0.0
+    size = motion.sum(axis=0)
+    moving = size > 0.0
+    lowest = min(LOWEST_LINES / (time[-1] - time[0]), rate / 4.0)
+    candidates = np.geomspace(lowest, rate / 2.0, CANDIDATES)
+    gain = 1.0 / (1.0 + (frequency / candidates[:, None]) ** (2 * SPLINE_ORDER))  # (candidates, frequencies)
+    lost = (gain * (1.0 - gain)) @ motion[:, moving] / (gain**2 @ motion[:, moving])
+    noise = (gain**2 @ fourth) * (floor[moving] / size[moving])
+    cost = np.where(lost < LARGEST_LOSS, lost**2 + noise * (1.0 + noise) / SAMPLES_PER_PARAMETER, np.inf)
+    return float(candidates[np.argmin(cost, axis=0)].max(initial=candidates[0] if moving.any() else candidates[-1]))
+
+
+def noise_level_error(samples: int) -> float:
+    """Relative standard error of the variance that :func:`position_noise` reads from so many samples.
+
+    A median over n lines has a relative variance of ``1 / (n ln² 2)``; the window makes 1.5 neighbours worth one.
+    """
+    lines = max(samples / 4.0, 1.0)
+    return float(np.sqrt(1.5 / lines) / np.log(2.0))
+
+
 def position_resolution(position: Array) -> Array:
     """Quantisation step by channel, shape (n,), in the channel's unit; 0 where values are not multiples of a step."""
     return np.array([_step(channel) for channel in position.T])
 
 
 def _step(values: Array) -> float:
-    """The smallest change, if nearly all changes are multiples of it and many samples share it."""
-    change = np.abs(np.diff(values))
-    change = change[change > 1e-12 * max(np.abs(values).max(initial=0.0), 1e-300)]
-    if len(change) < MINIMUM_CHANGES:
+    """The smallest distance of neighbouring levels, if nearly all small ones are multiples of it and many share it."""
+    levels = np.unique(values)
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > 1e-12 * max(np.abs(values).max(initial=0.0), 1e-300)]
+    if len(gaps) < MINIMUM_GAPS:
         return 0.0
-    step = float(np.quantile(change, 0.01))
-    multiples = change / step
+    step = float(np.quantile(gaps, 0.01))
+    multiples = gaps / step
     regular = np.abs(multiples - np.round(multiples)) < 0.05
     few = multiples < MULTIPLES_THAT_TELL
-    return step if few.sum() >= MINIMUM_CHANGES and regular[few].mean() > 0.95 else 0.0
+    return step if few.sum() >= MINIMUM_GAPS and regular[few].mean() > 0.95 else 0.0

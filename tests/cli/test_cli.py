@@ -1,5 +1,6 @@
 """The command line as a person meets it."""
 
+import dataclasses
 import json
 import subprocess
 import sys
@@ -37,6 +38,22 @@ def test_identify_writes_result_model_and_report(log, tmp_path):
     assert "accepted" in answer.stderr
     assert "<h1>" in (out / "report.html").read_text()
     assert (out / "identified.urdf").exists()
+
+
+def test_the_noise_of_unordered_samples_can_be_given(tmp_path):
+    run_of = simulated_run("two_link.urdf", 0, PlantSettings())
+    path, out = tmp_path / "samples.csv", tmp_path / "out"
+    samples = dataclasses.replace(run_of.recording, time=None, velocity=run_of.v, acceleration=run_of.a)
+    samples.write(path)
+    noise = ("--noise-position", "1e-3", "--noise-velocity", "0.1,0.2", "--noise-acceleration", "1")
+    answer = run("identify", URDF, path, "--method", "eiv", *noise, "--out", out)
+    assert "Noise of the measured motion" in answer.stderr
+    content = json.loads((out / "result.json").read_text())["input_noise"]
+    assert content["source"] == "given"
+    assert list(content["velocity"].values()) == [0.1, 0.2]
+    wrong = run("identify", URDF, path, "--noise-velocity", "fast")
+    assert wrong.exit_code == 2
+    assert "--noise-velocity wants a number" in wrong.stderr
 
 
 @pytest.mark.parametrize("method", ["ols", "wls", "stepwise", "tls"])

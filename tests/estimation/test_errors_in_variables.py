@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import eigh
+from scipy.stats import t as student
 
 from casysid.errors import ParameterError
 from casysid.estimation import ErrorsInVariables, Ridge, WeightedLeastSquares
-from casysid.estimation.errors_in_variables import heaviest_noise
+from casysid.estimation.errors_in_variables import limit_noise
 from casysid.moments import Moments
 
 TRUTH = np.array([1.0, -2.0, 0.5])
@@ -45,19 +47,57 @@ def test_without_noise_it_is_the_estimator_itself():
         assert ErrorsInVariables(inner).estimate(silent).parameters == pytest.approx(expected, abs=1e-12)
 
 
+def shares(moments):
+    """Generalised eigenvalues of pooled noise and sums."""
+    noise, gram = (sums.sum(axis=(0, 1))[:-1, :-1] for sums in (moments.noise, moments.gram))
+    return eigh(noise, gram, eigvals_only=True)
+
+
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.5, 30.0))
 def test_heavy_noise_is_removed_only_as_far_as_is_safe(seed, overstated):
     moments = noisy_problem(seed % 1000, 0.5)
-    assert moments.noise is not None
     loud = dataclasses.replace(moments, noise=overstated * moments.noise)
     estimate = ErrorsInVariables().estimate(loud)
-    removed = estimate.diagnostics["noise_removed"]
-    assert 0.0 < removed <= 1.0
     assert np.isfinite(estimate.parameters).all()
-    left = loud.denoised(removed).pooled()
-    assert np.linalg.eigvalsh(left.xx).min() > 0.0
-    assert removed * heaviest_noise(loud) <= 0.95 + 1e-9
+    limited = limit_noise(loud, 0.95)
+    assert shares(limited.moments) == pytest.approx(np.minimum(shares(loud), 0.95), abs=1e-9)
+    assert np.linalg.eigvalsh(limited.moments.denoised().pooled().xx).min() > 0.0
+    assert limited.directions == np.sum(shares(loud) > 0.95) == estimate.diagnostics["directions_too_noisy"]
+
+
+def test_one_hopeless_direction_does_not_spoil_the_others():
+    """The third column is pure noise: the other two come out as if it were not there."""
+    rng = np.random.default_rng(0)
+    clean = rng.normal(size=(6000, 3)) * [1.0, 1.0, 0.0]
+    noise = np.array([0.3, 0.3, 1.0])
+    x = clean + noise * rng.normal(size=clean.shape)
+    moments = Moments.from_rows(x, clean @ TRUTH + 0.1 * rng.normal(size=6000), blocks=8)
+    grown = np.zeros_like(moments.gram)
+    grown[:, 0, :3, :3] = np.diag(noise**2) * moments.count[:, 0, None, None] * 1.02
+    estimate = ErrorsInVariables(WeightedLeastSquares()).estimate(dataclasses.replace(moments, noise=grown))
+    assert estimate.diagnostics["directions_too_noisy"] == 1
+    assert estimate.parameters[:2] == pytest.approx(TRUTH[:2], abs=0.03)
+
+
+def test_standard_errors_hold_what_the_noise_level_leaves_open():
+    """A known noise level off by its own standard error moves the parameters by what is added to theirs."""
+    moments = noisy_problem(1, 0.3)
+    method, error = ErrorsInVariables(WeightedLeastSquares()), 1e-3
+    sure, unsure = (method.estimate(dataclasses.replace(moments, noise_error=e)) for e in (0.0, error))
+    added = unsure.covariance - sure.covariance
+    more = dataclasses.replace(moments, noise=(1.0 + error) * moments.noise)
+    moved = method.estimate(more).parameters - sure.parameters
+    assert np.sqrt(np.diag(added)) == pytest.approx(np.abs(moved), rel=0.02)
+
+
+def test_intervals_cover_the_truth():
+    covered = []
+    for seed in range(120):
+        estimate = ErrorsInVariables(WeightedLeastSquares()).estimate(noisy_problem(seed, 0.3, rows=1500, blocks=15))
+        half = student.ppf(0.975, estimate.spread.freedom) * estimate.std
+        covered.append(np.abs(estimate.parameters - TRUTH) <= half)
+    assert 0.91 <= np.mean(covered) <= 0.985
 
 
 def test_noise_follows_its_moments_through_shift_sum_and_choice():

@@ -5,14 +5,17 @@ import dataclasses
 import casadi as ca
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from casysid.accumulation import accumulate_moments
-from casysid.dynamics import Armature, build_regressor
+from casysid.dynamics import Armature, Viscous, build_regressor
+from casysid.errors import ParameterError
 from casysid.estimation import ErrorsInVariables, WeightedLeastSquares
 from casysid.identification import Settings
 from casysid.identification.problem import MOTION_TO_TORQUE_BAND, build_problem
 from casysid.recording import Recording
-from casysid.signals import BandAverage, build_smoother, position_noise
+from casysid.signals import BandAverage, NoiseLevels, build_smoother, position_noise
 from casysid.simulation import design_sinusoids
 from tests.simulated import bundled_robot
 
@@ -40,8 +43,7 @@ def test_noise_moments_of_an_acceleration_are_those_of_the_whole_linear_chain():
     """Armature's column is the acceleration: its noise is white noise through smoother, derivative and average."""
     sigma = 1e-3
     robot, recording, regressor, _, _ = noisy_recording(sigma, duration=4.0)
-    settings = Settings(friction=(Armature(),), blocks=4)
-    problem = build_problem(robot, [recording], CUTOFF, settings)
+    problem = build_problem(robot, [recording], CUTOFF, Settings(friction=(Armature(),), blocks=4))
     smoother = build_smoother(recording.time, MOTION_TO_TORQUE_BAND * CUTOFF)
     chain = smoother.smooth(np.eye(len(recording)), 2)
     energy = 0.0
@@ -72,6 +74,93 @@ def test_noise_moments_are_the_sum_of_jacobians_where_nothing_is_averaged():
         slow = sum((J := np.array(jacobian(s)) * sigma) @ J.T for s in state)
         moved = np.diag(slow) > 0.05 * np.diag(slow).max()  # elsewhere the bias of the mean shows, which J lacks
         assert np.diag(gained[joint])[:-1][moved] == pytest.approx(np.diag(slow)[moved], rel=0.15)
+
+
+def unordered(levels, seed=0, duration=5.0):
+    """A recording without time, whose positions, velocities and accelerations were measured with noise."""
+    robot, recording, regressor, reference, tau = noisy_recording(0.0, seed=seed, duration=duration)
+    rng = np.random.default_rng([seed, 1])
+    fields = {"position": reference.channels, "velocity": reference.v, "acceleration": reference.a}
+    measured = {name: values + getattr(levels, name) * rng.normal(size=values.shape) for name, values in fields.items()}
+    return robot, dataclasses.replace(recording, time=None, **measured), regressor, reference, tau
+
+
+def problem_of(robot, recording, levels, blocks=4):
+    chosen = Settings(friction=(Viscous(), Armature()), input_noise=levels, blocks=blocks)
+    return build_problem(robot, [recording], None, chosen)
+
+
+@given(st.integers(0, 1000), st.floats(1e-6, 1e-2))
+@settings(max_examples=8, deadline=None)
+def test_noise_moments_of_unordered_samples_add_over_blocks(seed, sigma):
+    levels = NoiseLevels(position=sigma, velocity=3.0 * sigma, acceleration=10.0 * sigma)
+    robot, recording, *_ = unordered(levels, seed, duration=2.0)
+    many, one = (problem_of(robot, recording, levels, blocks).moments for blocks in (8, 4))
+    size = np.abs(one.gram).sum(axis=0).max(axis=(-2, -1), keepdims=True)
+    assert np.abs(many.noise.sum(axis=0) - one.noise.sum(axis=0)).max() <= 1e-12 * size.max()
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_no_noise_adds_nothing(timed):
+    levels = NoiseLevels(position=0.0, velocity=0.0, acceleration=1e-300)
+    robot, recording, *_ = unordered(NoiseLevels(position=0.0, velocity=0.0, acceleration=0.0))
+    if timed:
+        recording = dataclasses.replace(recording, time=np.arange(len(recording)) / RATE)
+    chosen = Settings(input_noise=levels, blocks=4)
+    moments = build_problem(robot, [recording], CUTOFF if timed else None, chosen).moments
+    assert np.abs(moments.noise).max() <= 1e-12 * moments.gram.max()
+
+
+def test_small_noise_of_unordered_samples_adds_the_sum_of_jacobians():
+    levels = NoiseLevels(position=1e-3, velocity=1e-2, acceleration=0.3)
+    robot, recording, *_ = unordered(levels)
+    problem = problem_of(robot, recording, levels)
+    regressor, nv = problem.regressor, robot.nv
+    std = np.repeat([levels.position, levels.velocity, levels.acceleration], nv)
+    state = np.concatenate([recording.position, recording.velocity, recording.acceleration], axis=1)
+    step = 1e-5
+    slow = np.zeros(problem.moments.noise.shape[1:])
+    for k in range(3 * nv):  # central differences along every channel
+        ahead, behind = (
+            regressor.evaluate(*np.split(state + sign * step * np.eye(3 * nv)[k], 3, axis=1)) for sign in (1.0, -1.0)
+        )
+        column = std[k] * (ahead - behind) / (2.0 * step)  # (N, nv, p)
+        slow[:, :-1, :-1] += np.einsum("njm,njp->jmp", column, column)
+    found = problem.moments.noise.sum(axis=0)
+    for joint in range(nv):
+        diagonal = np.diag(slow[joint])[:-1]
+        moved = diagonal > 0.05 * diagonal.max()
+        assert np.diag(found[joint])[:-1][moved] == pytest.approx(diagonal[moved], rel=0.1)
+
+
+@pytest.mark.parametrize("share", [0.03, 0.1])
+def test_given_noise_of_unordered_samples_is_removed(share):
+    gains = []
+    for seed in range(3):
+        reference = noisy_recording(0.0, seed=seed, duration=15.0)[3]
+        levels = NoiseLevels(
+            position=1e-3,
+            velocity=tuple(share * np.ptp(reference.v, axis=0)),
+            acceleration=tuple(share * np.ptp(reference.a, axis=0)),
+        )
+        robot, recording, _, reference, tau = unordered(levels, seed, duration=15.0)
+        problem = problem_of(robot, recording, levels)
+        errors = []
+        for method in (WeightedLeastSquares(), ErrorsInVariables(WeightedLeastSquares())):
+            found = method.estimate(problem.moments, problem.regressor.prior).parameters
+            predicted = problem.regressor.predict(found, reference.q, reference.v, reference.a)
+            errors.append(np.sum((predicted - tau) ** 2))
+        gains.append(errors[0] / errors[1])
+    assert np.median(gains) > 10.0
+
+
+def test_levels_that_do_not_fit_are_named():
+    levels = NoiseLevels(position=(1e-3, 1e-3, 1e-3), velocity=0.1)
+    robot, recording, *_ = unordered(NoiseLevels(position=0.0, velocity=0.0, acceleration=0.0))
+    with pytest.raises(ParameterError, match="position noise: wanted one number or 2, one for each; got 3"):
+        problem_of(robot, recording, levels)
+    with pytest.raises(ParameterError, match="velocity noise must be finite and not negative"):
+        NoiseLevels(velocity=-1.0)
 
 
 @pytest.mark.parametrize("sigma", [3e-4, 3e-3])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from casysid.signals import motion_band, position_noise
+from casysid.signals import build_smoother, motion_band, position_noise, smoothing_cutoff
 
 
 @pytest.mark.parametrize("sigma", [1e-5, 1e-4, 1e-3])
@@ -32,3 +32,23 @@ def test_band_of_a_sine_is_its_frequency_whatever_the_noise(sigma):
 def test_a_joint_at_rest_has_no_band():
     time = np.arange(0, 10, 1e-2)
     assert motion_band(time, np.zeros((len(time), 1))) == pytest.approx([0.0])
+
+
+@pytest.mark.parametrize("sigma", [1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
+def test_quantised_and_noisy_positions_are_measured_within_a_fifth(sigma):
+    time, step = np.arange(0, 20, 2e-3), 1e-4
+    motion = np.column_stack([0.5 * np.sin(2 * np.pi * f * time) for f in (0.7, 1.9)])
+    noisy = motion + sigma * np.random.default_rng(0).normal(size=motion.shape)
+    logged = np.round(noisy / step) * step
+    assert position_noise(time, logged) == pytest.approx(np.std(logged - motion, axis=0), rel=0.2)
+
+
+def test_smoothing_keeps_the_motion_and_falls_with_the_noise():
+    time = np.arange(0, 15, 1 / 400)
+    motion = np.column_stack([0.1 * np.sin(2 * np.pi * f * time) for f in (0.8, 3.0)])
+    noise = np.random.default_rng(0).normal(size=motion.shape)
+    cutoffs = [smoothing_cutoff(time, motion + sigma * noise) for sigma in (0.0, 1e-5, 1e-4, 1e-3)]
+    assert cutoffs == sorted(cutoffs, reverse=True)
+    smoother = build_smoother(time, cutoffs[-1])
+    assert smoother.gain(3.0) > 0.997
+    assert cutoffs[-1] < 0.2 * cutoffs[0]

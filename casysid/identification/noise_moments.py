@@ -1,0 +1,77 @@
+"""What noise of the measured motion has added to the moments: simulation-extrapolation with antithetic noise.
+
+As much noise as there is, is added once more, with both signs, and the moments are taken the same way again: what they
+grow by is what the noise that was there has added. It holds for every joint type and regressor, and the noise has the
+colour that smoothing gives it; for small noise it is ``Σ J P Jᵀ`` and the bias of the mean. Noise that no low-pass has
+made small is added twice over as well, and a parabola in its variance is carried back to zero.
+
+Where positions are smoothed, Coulomb friction's smooth sign is no sharper than the noise of its velocity: about the
+expected sign, given what was measured. Its error is then uncorrelated with everything measured and attenuates nothing
+(Berkson), so its column is left out.
+
+Source: Cook and Stefanski 1994 (simulation-extrapolation); Berkson 1950.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from casysid.arrays import Array
+from casysid.dynamics import Coulomb, Regressor
+from casysid.errors import ParameterError
+from casysid.recording import Recording
+from casysid.signals import InputNoise
+
+DRAWS = 2
+"""Pairs of opposite noise whose growth is averaged, where the positions are smoothed."""
+DRAWS_AS_LOGGED = 4
+EXPECTED_KINDS = (Coulomb.kind,)
+"""Columns that are an expectation, given the noisy motion, and not a noisy value."""
+
+
+def noise_moments(
+    regressor: Regressor,
+    recordings: Sequence[Recording],
+    noise: Sequence[InputNoise | None],
+    gram: Array,
+    sums_of: Callable[[Sequence[Recording]], Array],
+    *,
+    as_logged: bool,
+) -> Array:
+    """What ``noise`` has added to ``gram``, of its shape.
+
+    Args:
+        regressor: Whose columns were summed.
+        recordings: As measured.
+        noise: Of each recording.
+        gram: Moments of the recordings.
+        sums_of: Moments of disturbed recordings, taken in the same way.
+        as_logged: Whether no low-pass has made the noise small.
+
+    Raises:
+        ParameterError: The noise of a recording is not known.
+    """
+    known = [one for one in noise if one is not None]
+    if len(known) < len(recordings):
+        raise ParameterError("noise moments: the noise of every recording must be known")
+
+    def growth(scale: float) -> Array:
+        total = np.zeros_like(gram)
+        for draw in range(draws):
+            for sign in (scale, -scale):
+                total += sums_of(
+                    [
+                        one.disturb(recording, sign, seed=draw * len(recordings) + k)
+                        for k, (one, recording) in enumerate(zip(known, recordings, strict=True))
+                    ]
+                )
+        return total / (2 * draws) - gram
+
+    draws = DRAWS_AS_LOGGED if as_logged else DRAWS
+    added = 3.0 * growth(1.0) - growth(np.sqrt(2.0)) if as_logged else growth(1.0)
+    if not as_logged:
+        expected = [m for m, parameter in enumerate(regressor.parameters) if parameter.kind in EXPECTED_KINDS]
+        added[..., expected, :] = added[..., :, expected] = 0.0
+    return added
