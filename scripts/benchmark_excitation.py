@@ -1,11 +1,14 @@
 """Times the design of excitation, compares it with rivals on the same problem, and checks every motion it returns.
 
-    python scripts/benchmark_excitation.py --json excitation.json [--part speed rivals safety] [--models DIR]
+    python scripts/benchmark_excitation.py --json excitation.json [--part speed rivals safety]
 
 ``speed``: four starts on bundled models (and on a URDF given with --robot), wall and processor seconds, evaluations,
 gradients against finite differences. ``rivals``: log det and condition number of the same weighted base information
 against the best of 200 random feasible motions and against SLSQP with finite differences, which is given ten times the
-time. ``safety``: violations on a grid finer than ten times that of the design, over robots and seeds.
+time on the same objective. ``safety``: violations on grids ten times finer than that of the design and more, and when
+the motion is played in MuJoCo under computed torque, over robots and seeds: on a machine like the model file, against
+the limits that were designed for; and on one with other masses, stiction, cables, lag and noisy sensors, against those
+of the file. Whether designed excitation pays is in ``rehearse_excitation.py``.
 """
 
 from __future__ import annotations
@@ -23,16 +26,18 @@ from scipy.optimize import minimize
 
 from casysid.bundled import find_model
 from casysid.errors import CasysidError, CasysidWarning
-from casysid.excitation import ConditionNumber, FourierSeries, build_excitation, design_excitation
+from casysid.excitation import ConditionNumber, FourierSeries, JointLimits, build_excitation, design_excitation
 from casysid.excitation.feasible import find_standing, random_start, small_start
 from casysid.excitation.program import Evaluation
 from casysid.excitation.repair import shrunk
 from casysid.excitation.search import STRIDE
 from casysid.robot import Robot
+from casysid.validation import RehearsalSettings, play
+from casysid.validation.rehearsal import build_machine
 
 SERIES = FourierSeries(10.0, 5)
 RANDOM = 200
-MOST_JOINTS = 4  # SLSQP, whose constraints are dense and differentiated by differences, is not run on larger robots
+SHARES = {"position": 0.95, "velocity": 0.9, "torque": 0.8}  # of the file's limits, that a design keeps to by default
 
 
 class Clock:
@@ -120,7 +125,8 @@ def slsqp(problem, seconds):
     standing, rng = find_standing(problem, 0), np.random.default_rng(0)
     lower, upper = evaluation.bounds(problem.tightening)
     finite = np.isfinite(lower), np.isfinite(upper)
-    began, best, ends = time.process_time(), (-np.inf, None), 0
+    nothing = {"log_det": -np.inf, "condition": np.inf}
+    began, best, ends = time.process_time(), (np.inf, nothing), 0
 
     def room(x):
         values = evaluation.constraints(x)
@@ -145,12 +151,11 @@ def slsqp(problem, seconds):
             )
             latest, ends = [answer.x], ends + 1
         smaller = shrunk(problem, latest[0])
-        if smaller is not None:
-            one = quality(problem, problem.trajectory(smaller[0]))
-            best = max(best, (one["log_det"], one["condition"]), key=lambda pair: pair[0])
+        if smaller is not None and (value := evaluation.objective(smaller[0])) < best[0]:
+            best = value, quality(problem, problem.trajectory(smaller[0]))
         drawn = random_start(problem, evaluation, standing, rng)
         x = x if drawn is None else drawn
-    return {"cpu": time.process_time() - began, "finished_runs": ends, "log_det": best[0], "condition": best[1]}
+    return {"cpu": time.process_time() - began, "finished_runs": ends, **best[1]}
 
 
 def run_rivals(robots, budget):
@@ -166,12 +171,11 @@ def run_rivals(robots, budget):
         given = min(10.0 * ours["cpu"], budget)
         row = {
             "robot": name,
-            "D": ours,
+            "default": ours,
             "condition number": second,
             "random": random_best(problem),
+            "SLSQP": {**slsqp(problem, given), "share_of_ten_times": given / (10.0 * ours["cpu"])},
         }
-        if problem.robot.nv <= MOST_JOINTS:
-            row["SLSQP"] = {**slsqp(problem, given), "share_of_ten_times": given / (10.0 * ours["cpu"])}
         rows.append(row)
         for rival, one in list(row.items())[1:]:
             figures = f"log det {one['log_det']:8.2f}  condition {one['condition']:10.4g}"
@@ -197,8 +201,45 @@ def random_tree(rng, joints):
     return Robot.from_pin(model, name=f"tree of {joints}")
 
 
+def file_limits(problem):
+    """The same problem within the limits of the model file (as assumed, where it has none), links just not touching."""
+    limits = problem.limits
+    reach = limits.half_range / SHARES["position"]
+    widest = JointLimits(
+        lower=limits.middle - reach,
+        upper=limits.middle + reach,
+        velocity=limits.velocity / SHARES["velocity"],
+        acceleration=limits.acceleration,
+        jerk=limits.jerk,
+        torque=limits.torque / SHARES["torque"],
+    )
+    return build_excitation(problem.robot, series=problem.series, limits=widest, clearance=0.0)
+
+
+def played(design, seed):
+    """Violations in MuJoCo, and the nearest of each kind as a share of its scale."""
+    machine = build_machine(design.problem.robot, RehearsalSettings(seed=seed))
+    try:
+        runs = {
+            "like_file": play(design, rate=1000.0),
+            "unlike_file": play(design, machine, within=file_limits(design.problem), seed=seed),
+        }
+    except CasysidError as error:
+        print(f"    not played: {error}", flush=True)
+        return {}
+    return {
+        name: {
+            "violations": [str(one) for one in run.verification.violations],
+            "tightest": {one.kind: one.share for one in run.verification.tightest},
+            "most_saturated": float(run.run.saturated.max()),
+            "status": run.run.status.name,
+        }
+        for name, run in runs.items()
+    }
+
+
 def run_safety(robots, cases):
-    """Violations at 10, 17 and 40 times the instants of the design grid."""
+    """Violations at 10, 17 and 40 times the instants of the design grid, and when played."""
     rng = np.random.default_rng(0)
     made = {
         f"{name} seed {seed}": (lambda path=path: Robot.from_file(path), seed)
@@ -219,23 +260,29 @@ def run_safety(robots, cases):
             rows.append({"case": name, "refused": str(error)})
             print(f"{name:24s} refused: {error}", flush=True)
             continue
-        checks = [design.check(factor * problem.samples) for factor in (10, 17, 40)]
-        violations = [len(check.violations) for check in checks]
+        violations = [len(design.check(factor * problem.samples).violations) for factor in (10, 17, 40)]
+        runs = played(design, seed)
         rows.append(
             {
                 "case": name,
                 "violations": violations,
+                "played": runs,
                 "status": design.status.name,
                 "shrink": design.shrink,
                 "log_det": design.log_det,
                 **clock.read(),
             }
         )
+        counts = {kind: len(one["violations"]) for kind, one in runs.items()}
         print(
-            f"{name:24s} violations {violations}, {design.status.name}, shrink {design.shrink:.4f}, "
+            f"{name:24s} violations {violations}, played {counts}, {design.status.name}, shrink {design.shrink:.4f}, "
             f"log det {design.log_det:.1f}, {rows[-1]['cpu']:.1f} s cpu",
             flush=True,
         )
+        for kind, one in runs.items():
+            nearest = ", ".join(f"{what} {share:.4f}" for what, share in one["tightest"].items())
+            line = f"    {kind:12s} {one['status']} {nearest}, saturated {one['most_saturated']:.2%}"
+            print(line, *one["violations"][:2], sep=" | ", flush=True)
     return rows
 
 
@@ -243,22 +290,21 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, help="write the figures here")
     parser.add_argument("--part", nargs="+", default=["speed", "rivals", "safety"])
+    parser.add_argument("--models", nargs="*", default=["two_link", "scara", "head", "arm"], help="bundled ones")
     parser.add_argument("--robot", nargs="*", default=[], help="further models, as NAME=FILE")
     parser.add_argument("--cases", type=int, default=20, help="of the safety part")
     parser.add_argument("--budget", type=float, default=120.0, help="processor seconds that SLSQP gets at most")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore", CasysidWarning)
     more = {name: Path(path) for name, _, path in (text.partition("=") for text in arguments.robot)}
-    bundled = {name: find_model(name) for name in ("two_link", "scara", "head", "arm")}
+    robots = {name: find_model(name) for name in arguments.models} | more
     figures = {}
     if "speed" in arguments.part:
-        figures["speed"] = run_speed(bundled | more)
+        figures["speed"] = run_speed(robots)
     if "rivals" in arguments.part:
-        figures["rivals"] = run_rivals(
-            {name: bundled[name] for name in ("two_link", "scara", "head")} | more, arguments.budget
-        )
+        figures["rivals"] = run_rivals(robots, arguments.budget)
     if "safety" in arguments.part:
-        figures["safety"] = run_safety(bundled | more, arguments.cases)
+        figures["safety"] = run_safety(robots, arguments.cases)
     if arguments.json:
         arguments.json.write_text(json.dumps(figures, indent=1))
 
