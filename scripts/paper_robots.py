@@ -2,9 +2,11 @@
 
 Each seed is a machine of its own that differs from its model file. The paper's methods see what its authors had: motion
 by differences of the encoders' positions at the control rate, all signals behind the low-pass of the controller's
-velocity; the same moments, regressor and weights between joints for all, no prior. Beyond the paper are casysid's own:
-motion from a spline, equations averaged below a cut-off that the data chose, the model file as prior, and equations of
-joints that friction holds left out.
+velocity; the same moments, regressor and weights between joints for all, no prior. The noise of accelerations is then
+as large as they are, and one joint's is in the columns of every link that it moves: it keeps the columns' relations, so
+that a model with noise of its own in each column cannot see it. Two rows beside the paper's take it out of the moments
+by what the encoders' noise adds to them. Beyond the paper are casysid's own: motion from a spline, equations averaged
+below a cut-off that the data chose, the model file as prior, and equations of joints that friction holds left out.
 """
 
 from __future__ import annotations
