@@ -86,6 +86,7 @@ def main() -> None:
     parser.add_argument("--methods", default="ols,wls,ridge")
     parser.add_argument("--consistency", choices=["none", "inertia", "full"], default="full")
     parser.add_argument("--robots", default=",".join(trial.folder for trial in TRIALS))
+    parser.add_argument("--friction", choices=["plain", "auto"], default="plain", help="auto: no coupling is declared")
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
     methods = [estimator_by_name(name) for name in arguments.methods.split(",")]
@@ -105,7 +106,8 @@ def main() -> None:
         table.add_column(header, justify="left" if header == "robot" else "right")
     for trial in track([one for one in TRIALS if one.folder in chosen], console=Console(stderr=True), transient=True):
         started = time.perf_counter()
-        settings = Settings(consistency=consistency, couplings=trial.couplings)
+        auto = arguments.friction == "auto"
+        settings = Settings(consistency=consistency, choose_friction=auto, couplings=() if auto else trial.couplings)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             preparation = prepare_trial(arguments.data, trial, settings)
@@ -122,6 +124,7 @@ def main() -> None:
             "unconstrained": {name: result.unconstrained.relative for name, result in results.items()},
             "consistent": {name: result.is_physically_consistent for name, result in results.items()},
             "file": any_result.file.relative,
+            "friction": [one.sentence for one in preparation.friction.chosen],
             "seconds": seconds,
         }
         table.add_row(
@@ -134,6 +137,9 @@ def main() -> None:
             f"{seconds:.1f}",
         )
     console.print(table)
+    for folder, content in figures.items():
+        for sentence in content["friction"]:
+            console.print(f"{folder}: {sentence}", markup=False, highlight=False)
     if arguments.json:
         arguments.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
 

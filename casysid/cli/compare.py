@@ -14,6 +14,8 @@ from casysid.cli.options import (
     CutoffOption,
     DelayOption,
     FloatingOption,
+    FrictionOption,
+    FrictionWord,
     GravityOption,
     HeldOutOption,
     LockOption,
@@ -42,6 +44,7 @@ def compare(
     time_scale: TimeScaleOption = None,
     delay: DelayOption = "auto",
     coupling: CouplingOption = None,
+    friction: FrictionOption = FrictionWord.PLAIN,
     gravity: GravityOption = None,
     lock: LockOption = None,
     floating_base: FloatingOption = False,
@@ -61,7 +64,7 @@ def compare(
 
         names = [kind.name for kind in ESTIMATORS] if methods == "all" else methods.split(",")
         estimators = [estimator_by_name(name) for name in names]
-        settings = make_settings("ridge", consistency, cutoff, coupling, time_scale, delay)
+        settings = make_settings("ridge", consistency, cutoff, coupling, time_scale, delay, friction=friction)
         model = load_robot(robot, gravity, lock, floating_base)
         fitted, unseen = load_recordings(model, logs, held_out, split)
         with progress_bar(console) as progress:

@@ -16,6 +16,8 @@ from casysid.cli.options import (
     CutoffOption,
     DelayOption,
     FloatingOption,
+    FrictionOption,
+    FrictionWord,
     GravityOption,
     HeldOutOption,
     LockOption,
@@ -51,6 +53,7 @@ def identify(
     noise_position: PositionNoiseOption = None,
     noise_velocity: VelocityNoiseOption = None,
     noise_acceleration: AccelerationNoiseOption = None,
+    friction: FrictionOption = FrictionWord.PLAIN,
     gravity: GravityOption = None,
     lock: LockOption = None,
     floating_base: FloatingOption = False,
@@ -71,7 +74,7 @@ def identify(
         from casysid.report import write_report
 
         noise = noise_levels(noise_position, noise_velocity, noise_acceleration)
-        settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise)
+        settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise, friction)
         model = load_robot(robot, gravity, lock, floating_base)
         fitted, unseen = load_recordings(model, logs, held_out, split)
         with progress_bar(console) as progress:
@@ -103,5 +106,6 @@ def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...
         console.print()
     verdict = judge(result)
     console.print(f"[bold {'green' if verdict.accepted else 'red'}]{verdict.headline}[/]")
-    for line in (*verdict.reasons, *verdict.remarks, *notes):
+    friction = [one.sentence for one in result.friction.chosen]
+    for line in (*verdict.reasons, *verdict.remarks, *friction, *notes):
         console.print(f"  · {line}", markup=False, soft_wrap=True)

@@ -23,6 +23,13 @@ class ConsistencyChoice(enum.StrEnum):
     FULL = "full"
 
 
+class FrictionWord(enum.StrEnum):
+    """Words of ``--friction``."""
+
+    PLAIN = "plain"
+    AUTO = "auto"
+
+
 RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="URDF or MJCF file, or a bundled model's name.")]
 LogsArgument = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings: CSV, CSV.gz, Parquet or NPZ.")]
 HeldOutOption = Annotated[
@@ -63,6 +70,12 @@ VelocityNoiseOption = Annotated[
 AccelerationNoiseOption = Annotated[
     str | None,
     typer.Option("--noise-acceleration", metavar="STD[,STD...]", help="Of accelerations likewise [rad/s², m/s²]."),
+]
+FrictionOption = Annotated[
+    FrictionWord,
+    typer.Option(
+        help="plain: viscous, Coulomb, offset and armature; auto: what else the data ask for, joint by joint."
+    ),
 ]
 GravityOption = Annotated[
     tuple[float, float, float] | None,
@@ -135,6 +148,7 @@ def make_settings(
     time_scale: float | None = None,
     delay: str = "auto",
     input_noise: NoiseLevels | None = None,
+    friction: FrictionWord = FrictionWord.PLAIN,
 ) -> Settings:
     """Settings from the command line's words."""
     from casysid.dynamics import Coupling
@@ -151,6 +165,7 @@ def make_settings(
         time_scale=time_scale,
         delay=_seconds(delay),
         input_noise=input_noise or NoiseLevels(),
+        choose_friction=friction is FrictionWord.AUTO,
         couplings=tuple(Coupling(joints=joints, weights=(1.0,) * len(joints)) for joints in pairs),
     )
 

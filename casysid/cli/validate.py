@@ -36,16 +36,23 @@ def validate(
         from casysid.identification.output import write_json
         from casysid.recording import read_recordings
         from casysid.report.validation_tables import validation_tables
-        from casysid.validation import read_delays, read_drives
+        from casysid.validation import read_delays, read_drives, read_friction
         from casysid.validation import validate as run
 
         model = load_robot(robot, gravity, lock, floating_base)
         recordings = read_recordings(logs, model)
         drives, filtered = read_drives(result) if result else (None, None)
         delays = read_delays(result) if result else None
+        friction = read_friction(result) if result else None
         with progress_bar(console) as progress:
             validation = run(
-                model, recordings, drives=drives, delays=delays, cutoff=cutoff or filtered, progress=progress
+                model,
+                recordings,
+                drives=drives,
+                friction=friction,
+                delays=delays,
+                cutoff=cutoff or filtered,
+                progress=progress,
             )
         out.mkdir(parents=True, exist_ok=True)
         write_json(validation.to_json(), out / "validation.json")

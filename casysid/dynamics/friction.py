@@ -7,6 +7,7 @@ joint ``c`` is a unit vector; a motor that turns two joints of a wrist has ``c =
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -28,26 +29,31 @@ class Direction:
         name: The degree of freedom, or those of a coupling joined by ``+``.
         weights: ``c``, shape (nv,).
         linear: Whether it is a length [m] rather than an angle [rad].
+        load: What gravity asks along it by a model, symbolic, [N m] or [N]; None for columns that do not want it.
     """
 
     name: str
     weights: Array
     linear: bool
+    load: Any = None
 
 
 @dataclass(frozen=True)
 class Coupling:
     """A motor or gear that acts on several joints: its coordinate is the weighted sum of theirs.
 
-    The sum counts as a length when all its joints are linear, else as an angle (a ball screw's weight is in rad/m).
+    The sum counts as a length when all its joints are linear, else as an angle (a ball screw's weight is in rad/m). Its
+    name holds the signs of the weights, such as ``joint_5+joint_6``.
 
     Attributes:
         joints: Names of degrees of freedom.
         weights: One for each.
+        kinds: Of friction that it has; None for all that joints have.
     """
 
     joints: tuple[str, ...]
     weights: tuple[float, ...]
+    kinds: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         if len(self.joints) < 2 or len(set(self.joints)) != len(self.joints) or len(self.joints) != len(self.weights):
@@ -55,6 +61,12 @@ class Coupling:
                 "coupling: needs two or more different joints and one weight for each; "
                 f"got joints {self.joints} and weights {self.weights}"
             )
+
+    @property
+    def name(self) -> str:
+        """The joints with the signs of their weights between them."""
+        signs = ["" if k == 0 and w >= 0.0 else "+" if w >= 0.0 else "-" for k, w in enumerate(self.weights)]
+        return "".join(sign + joint for sign, joint in zip(signs, self.joints, strict=True))
 
 
 class FrictionColumn(ABC):
@@ -109,8 +121,8 @@ class Viscous(FrictionColumn):
 
 
 @dataclass(frozen=True)
-class Coulomb(FrictionColumn):
-    """Dry friction, ``tanh(velocity / width)``: the sign of velocity, made smooth within a width.
+class SmoothSign(FrictionColumn):
+    """A column that changes with the sign of velocity, made smooth: ``tanh(velocity / width)``.
 
     Attributes:
         width: Velocity [rad/s or m/s] at which 76 % of the friction acts: one for all, one for each of the nv degrees
@@ -119,9 +131,6 @@ class Coulomb(FrictionColumn):
 
     width: float | Sequence[float] | Array | Mapping[str, float] = 0.01
 
-    kind: ClassVar[str] = "coulomb"
-    non_negative: ClassVar[bool] = True
-
     def __post_init__(self) -> None:
         if isinstance(self.width, Mapping):
             values = np.array(list(self.width.values()), dtype=np.float64)
@@ -129,13 +138,9 @@ class Coulomb(FrictionColumn):
             values = np.asarray(self.width, dtype=np.float64)
             object.__setattr__(self, "width", float(values) if values.ndim == 0 else tuple(values.ravel().tolist()))
         if not (np.isfinite(values).all() and (values > 0.0).all()):
-            raise ParameterError(f"Coulomb friction: width must be positive and finite; got {self.width}")
+            raise ParameterError(f"{self.kind} friction: width must be positive and finite; got {self.width}")
 
-    def unit(self, direction: Direction) -> str:
-        """Unit of the parameter."""
-        return _force_unit(direction)
-
-    def torque(self, direction: Direction, position: Any, velocity: Any, acceleration: Any) -> Any:
+    def sign(self, direction: Direction, velocity: Any) -> Any:
         """``tanh(ds/dt / width)``."""
         return ca.tanh(velocity / self.width_along(direction))
 
@@ -148,7 +153,7 @@ class Coulomb(FrictionColumn):
         if isinstance(self.width, Mapping):
             if direction.name not in self.width:
                 raise ParameterError(
-                    f"Coulomb friction: width names {sorted(self.width)}, but '{direction.name}' is missing; "
+                    f"{self.kind} friction: width names {sorted(self.width)}, but '{direction.name}' is missing; "
                     "name it or give one number"
                 )
             return float(self.width[direction.name])
@@ -157,10 +162,26 @@ class Coulomb(FrictionColumn):
             return float(widths)
         if widths.shape != c.shape:
             raise ParameterError(
-                f"Coulomb friction: width must be one number or one for each of the {c.size} degrees of freedom; "
+                f"{self.kind} friction: width must be one number or one for each of the {c.size} degrees of freedom; "
                 f"got {widths.size}"
             )
         return float(c @ widths)
+
+
+@dataclass(frozen=True)
+class Coulomb(SmoothSign):
+    """Dry friction: a torque against motion that does not depend on speed."""
+
+    kind: ClassVar[str] = "coulomb"
+    non_negative: ClassVar[bool] = True
+
+    def unit(self, direction: Direction) -> str:
+        """Unit of the parameter."""
+        return force_unit(direction)
+
+    def torque(self, direction: Direction, position: Any, velocity: Any, acceleration: Any) -> Any:
+        """``tanh(ds/dt / width)``."""
+        return self.sign(direction, velocity)
 
     def prior(self, robot: Robot, dof: int) -> float:
         """The file's dry friction."""
@@ -175,7 +196,7 @@ class Offset(FrictionColumn):
 
     def unit(self, direction: Direction) -> str:
         """Unit of the parameter."""
-        return _force_unit(direction)
+        return force_unit(direction)
 
     def torque(self, direction: Direction, position: Any, velocity: Any, acceleration: Any) -> Any:
         """One."""
@@ -200,6 +221,13 @@ class Armature(FrictionColumn):
     def prior(self, robot: Robot, dof: int) -> float:
         """The file's armature."""
         return float(robot.armature[dof])
+
+
+def with_width(friction: Sequence[FrictionColumn], width: float | Sequence[float]) -> tuple[FrictionColumn, ...]:
+    """The columns with another width of their smooth sign, where they have one."""
+    return tuple(
+        dataclasses.replace(column, width=width) if isinstance(column, SmoothSign) else column for column in friction
+    )
 
 
 DEFAULT_FRICTION: tuple[FrictionColumn, ...] = (Viscous(), Coulomb(), Offset(), Armature())
@@ -230,8 +258,9 @@ def coupling_direction(robot: Robot, coupling: Coupling) -> Direction:
             f"coupling: no degree of freedom named {', '.join(unknown)}; known are {', '.join(driven)}"
         )
     weights = sum(w * driven[name].weights for name, w in zip(coupling.joints, coupling.weights, strict=True))
-    return Direction("+".join(coupling.joints), frozen(weights), all(driven[name].linear for name in coupling.joints))
+    return Direction(coupling.name, frozen(weights), all(driven[name].linear for name in coupling.joints))
 
 
-def _force_unit(direction: Direction) -> str:
+def force_unit(direction: Direction) -> str:
+    """Unit of a torque along a direction."""
     return "N" if direction.linear else "N m"

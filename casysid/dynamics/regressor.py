@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,44 +15,16 @@ import numpy.typing as npt
 from casysid.arrays import Array, frozen
 from casysid.dynamics import symbolic
 from casysid.dynamics.bulk import Bulk
-from casysid.dynamics.friction import (
-    DEFAULT_FRICTION,
-    Coupling,
-    Direction,
-    FrictionColumn,
-    coupling_direction,
-    joint_directions,
-)
-from casysid.dynamics.joints import constant
+from casysid.dynamics.drive import ColumnMaker, Parameter, drive_columns
+from casysid.dynamics.friction import DEFAULT_FRICTION, Coupling, Direction, FrictionColumn
 from casysid.errors import ParameterError
-from casysid.robot import JointKind, Robot
+from casysid.robot import Robot
 
 _INERTIAL = {
     "m": "kg", "mcx": "kg m", "mcy": "kg m", "mcz": "kg m",
     "Ixx": "kg m^2", "Ixy": "kg m^2", "Iyy": "kg m^2", "Ixz": "kg m^2", "Iyz": "kg m^2", "Izz": "kg m^2",
 }  # fmt: skip
 _POSITIVE = {"m", "Ixx", "Iyy", "Izz"}
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """What one column of the regressor multiplies.
-
-    Attributes:
-        name: ``<owner>.<kind>``.
-        owner: A link, a degree of freedom, or those of a coupling joined by ``+``.
-        kind: ``m`` ... ``Izz``, or the friction column's kind.
-        unit: In SI.
-        non_negative: Whether it cannot be negative.
-        prior: The model file's value.
-    """
-
-    name: str
-    owner: str
-    kind: str
-    unit: str
-    non_negative: bool
-    prior: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,12 +36,16 @@ class Regressor:
         parameters: What the p columns multiply: ten for each link, then friction kind by kind, then couplings.
         function: ``casadi.Function`` ``(q, v, a) -> Y``, sparse, shape (nv, p).
         torque: ``casadi.Function`` ``(q, v, a, parameters) -> tau``, which is ``Y θ`` in fewer operations.
+        friction: Kinds of friction in it.
+        couplings: Transmissions in it.
     """
 
     robot: Robot
     parameters: tuple[Parameter, ...]
     function: Any
     torque: Any
+    friction: tuple[FrictionColumn, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -168,25 +144,58 @@ def build_regressor(
         ParameterError: When a kind of friction or a coupling is given twice, a coupling names an unknown joint, or a
             column uses the position of a degree of freedom that has none.
     """
-    kinds, coupled = [column.kind for column in friction], [coupling.joints for coupling in couplings]
+    kinds, coupled = [column.kind for column in friction], [coupling.name for coupling in couplings]
     if len(set(kinds)) != len(kinds) or len(set(coupled)) != len(coupled):
         raise ParameterError(f"friction: every kind and every coupling once; got {kinds} and {coupled}")
     state = symbolic.State.of(robot)
     still = ca.SX(robot.nv, 1)
     motions = symbolic.link_motions(robot, symbolic.State(state.q, still, still) if quasi_static else state)
     driven = symbolic.State(state.q, state.v, still) if quasi_static else state
-    drive = list(_drive_columns(robot, driven, friction, couplings))
+    drive = list(drive_columns(robot, driven, friction, couplings))
     drive_matrix = ca.horzcat(ca.SX(robot.nv, 0), *(column for _, column in drive))
     parameters = (*_inertial_parameters(robot), *(parameter for parameter, _ in drive))
     rigid = robot.inertial_parameters.size
     theta = ca.SX.sym("parameters", len(parameters))
-    Y = ca.sparsify(ca.horzcat(symbolic.regressor(robot, motions), drive_matrix))
+    Y = ca.horzcat(symbolic.regressor(robot, motions), drive_matrix)
     tau = symbolic.inverse_dynamics(robot, motions, theta[:rigid]) + drive_matrix @ theta[rigid:]
+    built = _regressor(robot, state, parameters, Y, theta, tau)
+    return replace(built, friction=tuple(friction), couplings=tuple(couplings))
+
+
+def extend_regressor(regressor: Regressor, columns: Sequence[tuple[FrictionColumn, Direction]]) -> Regressor:
+    """A regressor with further columns, each along one direction, named by their place so that kinds may repeat.
+
+    Raises:
+        ParameterError: A column is not there along its direction, or uses a position that is none.
+    """
+    robot, state = regressor.robot, symbolic.State.of(regressor.robot)
+    column_along = ColumnMaker(robot, state)
+    extra = [column_along(column, direction, 0.0) for column, direction in columns]
+    missing = [
+        f"{column.kind} of {direction.name}" for (column, direction), e in zip(columns, extra, strict=True) if e is None
+    ]
+    if missing:
+        raise ParameterError(f"friction: no column for {', '.join(missing)}")
+    found = [entry for entry in extra if entry is not None]
+    parameters = (
+        *regressor.parameters,
+        *(replace(parameter, name=f"{parameter.name} #{k}") for k, (parameter, _) in enumerate(found)),
+    )
+    matrix = ca.horzcat(ca.SX(robot.nv, 0), *(torque for _, torque in found))
+    theta, p = ca.SX.sym("parameters", len(parameters)), len(regressor.parameters)
+    inputs = (state.q, state.v, state.a)
+    Y, tau = ca.horzcat(regressor.function(*inputs), matrix), regressor.torque(*inputs, theta[:p]) + matrix @ theta[p:]
+    return _regressor(robot, state, parameters, Y, theta, tau)
+
+
+def _regressor(
+    robot: Robot, state: symbolic.State, parameters: tuple[Parameter, ...], Y: Any, theta: Any, tau: Any
+) -> Regressor:
     inputs, names = [state.q, state.v, state.a], ["q", "v", "a"]
     return Regressor(
         robot=robot,
         parameters=parameters,
-        function=ca.Function("regressor", inputs, [Y], names, ["Y"], {"cse": True}),
+        function=ca.Function("regressor", inputs, [ca.sparsify(Y)], names, ["Y"], {"cse": True}),
         torque=ca.Function(
             "torque", [*inputs, theta], [ca.densify(tau)], [*names, "parameters"], ["tau"], {"cse": True}
         ),
@@ -198,52 +207,3 @@ def _inertial_parameters(robot: Robot) -> Iterator[Parameter]:
     for link, priors in zip(robot.links, values, strict=True):
         for (kind, unit), prior in zip(_INERTIAL.items(), priors, strict=True):
             yield Parameter(f"{link}.{kind}", link, kind, unit, kind in _POSITIVE, float(prior))
-
-
-def _drive_columns(
-    robot: Robot, state: symbolic.State, friction: Sequence[FrictionColumn], couplings: Sequence[Coupling]
-) -> Iterator[tuple[Parameter, Any]]:
-    """Every friction column with its parameter: kind by kind for the joints, then coupling by coupling."""
-    positions, missing = _positions(robot, state)
-
-    def build(column: FrictionColumn, direction: Direction, prior: float) -> tuple[Parameter, Any] | None:
-        weights = constant(direction.weights)
-        s, ds, dds = (weights.T @ x for x in (positions, state.v, state.a))
-        expression = column.torque(direction, s, ds, dds)
-        if expression is None:
-            return None
-        torque = ca.SX(expression)
-        if ca.depends_on(torque, missing):
-            raise ParameterError(
-                f"friction: '{column.kind}' uses the position of '{direction.name}', which has none; return None there"
-            )
-        name, unit = f"{direction.name}.{column.kind}", column.unit(direction)
-        parameter = Parameter(name, direction.name, column.kind, unit, column.non_negative, prior)
-        return parameter, weights @ torque
-
-    joints = joint_directions(robot)
-    ordinary = [
-        build(column, direction, column.prior(robot, dof)) for column in friction for dof, direction in joints.items()
-    ]
-    coupled = [
-        build(column, direction, 0.0)
-        for direction in (coupling_direction(robot, coupling) for coupling in couplings)
-        for column in friction
-    ]
-    yield from (entry for entry in ordinary if entry is not None)
-    moving = ca.vertcat(state.q, state.v, state.a)
-    yield from (entry for entry in coupled if entry is not None and ca.depends_on(entry[1], moving))
-
-
-def _positions(robot: Robot, state: symbolic.State) -> tuple[Any, Any]:
-    """The coordinate of each degree of freedom (nv,), with a symbol where there is none; and these symbols."""
-    missing = ca.SX.sym("position", robot.nv)
-    positions = ca.SX(missing)
-    for joint in robot.joints:
-        match joint.kind:
-            case JointKind.REVOLUTE | JointKind.PRISMATIC:
-                positions[joint.v] = state.q[joint.q]
-            case JointKind.CONTINUOUS:
-                cosine, sine = ca.vertsplit(state.q[joint.q])
-                positions[joint.v] = ca.atan2(sine, cosine)
-    return positions, missing

@@ -6,7 +6,7 @@ import json
 import os
 from pathlib import Path
 
-from casysid.identification.result import IdentificationResult, without_infinities
+from casysid.identification.result import JOINT_KINDS, IdentificationResult, without_infinities
 from casysid.identification.verdict import judge
 from casysid.moments import write_moments
 from casysid.robot import write_robot
@@ -58,4 +58,16 @@ def _write_model(result: IdentificationResult, directory: Path, export_inconsist
         dry_friction=result.drive_vector("coulomb"),
         armature=result.drive_vector("armature"),
     )
-    return written.notes
+    return (*written.notes, *_friction_notes(result, path))
+
+
+def _friction_notes(result: IdentificationResult, path: Path) -> list[str]:
+    """What of friction a robot file has no place for, and how it was left out."""
+    homeless = [
+        parameter.name
+        for parameter in result.regressor.parameters[10 * len(result.robot.links) :]
+        if parameter.kind not in JOINT_KINDS or parameter.owner not in result.robot.dofs
+    ]
+    if not homeless:
+        return []
+    return [f"{path.name} has no place for {', '.join(homeless)}: they are in result.json, under friction."]

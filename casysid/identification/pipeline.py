@@ -17,6 +17,8 @@ from casysid.identifiability import BaseParameters, excited_base_parameters, str
 from casysid.identification.coulomb import choose_relative_width
 from casysid.identification.cutoff import COARSE_STEP, FINE_STEP, CutoffChoice, choose_cutoff
 from casysid.identification.delay import DelayChoice, choose_delay, given_delay
+from casysid.identification.friction_choice import FrictionChoice, choose_friction
+from casysid.identification.friction_laws import friction_laws
 from casysid.identification.prediction import torque_error
 from casysid.identification.problem import (
     USUAL_WIDTH,
@@ -55,6 +57,7 @@ class Preparation:
         time_base: What was found of the recordings' clock.
         cutoff: The low-pass and why.
         delay: How late the torque is, and what was taken out of all recordings.
+        friction: What the data added to the friction that was asked for.
         problem: Regressor, motions and moments of the fitted recordings.
         held_out: Motions that are only predicted.
         structural: Base parameters of the mechanism.
@@ -65,6 +68,7 @@ class Preparation:
     time_base: TimeBase
     cutoff: CutoffChoice
     delay: DelayChoice
+    friction: FrictionChoice
     problem: LinearProblem
     held_out: tuple[Motion, ...]
     structural: BaseParameters
@@ -117,11 +121,13 @@ def prepare(
     settings = dataclasses.replace(settings, quasi_static=time_base.quasi_static)
     fitted = tuple(recording.with_time_scaled(time_base.scale) for recording in fitted)
     unseen = tuple(recording.with_time_scaled(time_base.scale) for recording in held_out)
-    cutoff, delay, width, moving_only = _settle(robot, fitted, settings, progress)
+    cutoff, delay, width, moving_only, friction = _settle(robot, fitted, settings, progress)
     fitted, unseen = (tuple(aligned(one, delay.seconds) for one in several) for several in (fitted, unseen))
     clock.lap("tuning")
     progress("moments", 0.0)
-    problem = build_problem(robot, fitted, cutoff.cutoff, settings, relative_width=width, moving_only=moving_only)
+    problem = build_problem(
+        robot, fitted, cutoff.cutoff, friction.settings, relative_width=width, moving_only=moving_only
+    )
     predicted = tuple(
         make_motion(robot, one, cutoff.cutoff, smoothing=position_smoothing(one, cutoff.cutoff, settings))
         for one in unseen
@@ -129,7 +135,7 @@ def prepare(
     structural = structural_base_parameters(problem.regressor)
     clock.lap("moments")
     progress("moments", 1.0)
-    return Preparation(robot, time_base, cutoff, delay, problem, predicted, structural, clock.laps)
+    return Preparation(robot, time_base, cutoff, delay, friction, problem, predicted, structural, clock.laps)
 
 
 def solve(preparation: Preparation, settings: Settings, *, progress: Progress = silent) -> IdentificationResult:
@@ -151,6 +157,7 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
         time_base=preparation.time_base,
         cutoff=preparation.cutoff,
         delay=preparation.delay,
+        friction=preparation.friction,
         regressor=regressor,
         moments=problem.moments,
         estimate=estimate,
@@ -182,7 +189,7 @@ def _project(
     projection = build_projection(
         regressor.parameters,
         consistency=settings.consistency,
-        knowledge=settings.knowledge,
+        knowledge=(*settings.knowledge, *friction_laws(regressor)),
         prior_budget=PRIOR_BUDGET,
     )
     energy = moments.pooled(estimate.noise_std**-2.0).residual_energy(estimate.parameters)
@@ -195,13 +202,13 @@ def _project(
 
 def _settle(
     robot: Robot, recordings: Sequence[Recording], settings: Settings, progress: Progress
-) -> tuple[CutoffChoice, DelayChoice, Array, Mask]:
+) -> tuple[CutoffChoice, DelayChoice, Array, Mask, FrictionChoice]:
     """Cut-off, sharpness of Coulomb friction, whose stands to leave out, each given the others; roughly, then finely.
 
     The cut-off is chosen with all stands in, so that all candidates are judged by the same equations. The second time
-    the torque's delay has been taken out.
+    the torque's delay has been taken out. Further kinds of friction are chosen last.
     """
-    width: float | Array = USUAL_WIDTH
+    width, friction = np.full(robot.nv, USUAL_WIDTH), FrictionChoice(settings)
     moving_only = np.zeros(robot.nv, dtype=bool)
     delay = given_delay(robot, 0.0)
     for pace, step in (("rough", COARSE_STEP), ("fine", FINE_STEP)):
@@ -227,7 +234,13 @@ def _settle(
             progress("delay", 0.0)
             delay = choose_delay(robot, recordings, cutoff.cutoff, settings, width)
             progress("delay", 1.0)
-    return cutoff, delay, np.broadcast_to(width, robot.nv), moving_only
+    if settings.choose_friction:
+        progress("friction, kinds", 0.0)
+        friction = choose_friction(robot, fitted, cutoff.cutoff, settings, width, moving_only)
+        if friction.chosen:
+            width = choose_relative_width(robot, fitted, cutoff.cutoff, friction.settings, moving_only)
+        progress("friction, kinds", 1.0)
+    return cutoff, delay, width, moving_only, friction
 
 
 class _Clock:

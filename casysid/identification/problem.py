@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
-from casysid.dynamics import Coulomb, FrictionColumn, Regressor, build_regressor
+from casysid.dynamics import FrictionColumn, Regressor, build_regressor, with_width
 from casysid.estimation import ErrorsInVariables
 from casysid.identification.noise_moments import noise_moments
 from casysid.identification.settings import Settings
@@ -91,17 +91,10 @@ def build_problem(
             freedom.
         quick: Decimate, and leave out what noise adds: for trials.
     """
-    motions = tuple(
-        make_motion(robot, recording, cutoff, smoothing=position_smoothing(recording, cutoff, settings), quick=quick)
-        for recording in recordings
-    )
-    motions = tuple(dataclasses.replace(motion, standing=motion.standing & moving_only) for motion in motions)
+    motions = make_motions(robot, recordings, cutoff, settings, moving_only=moving_only, quick=quick)
     noise = () if quick else tuple(_input_noise(recording, cutoff, settings) for recording in recordings)
     input_noise = mean_input_noise(noise)
-    friction = with_widths(settings, motions, relative_width, input_noise)
-    regressor = build_regressor(
-        robot, friction=friction, couplings=settings.couplings, quasi_static=bool(settings.quasi_static)
-    )
+    regressor = regressor_for(robot, motions, settings, relative_width, input_noise)
     moments = sum_moments(regressor, motions, cutoff, settings)
     if input_noise is not None:
 
@@ -125,12 +118,42 @@ def with_widths(
     relative_width: float | Array,
     input_noise: InputNoise | None = None,
 ) -> tuple[FrictionColumn, ...]:
-    """The friction columns asked for, Coulomb's smooth sign as sharp as the motions allow."""
+    """The friction columns asked for, their smooth signs as sharp as the motions allow."""
     width = settings.coulomb_width or tuple(coulomb_width(motions, relative_width, input_noise).tolist())
-    return tuple(
-        dataclasses.replace(column, width=width) if isinstance(column, Coulomb) else column
-        for column in settings.friction
+    return with_width(settings.friction, width)
+
+
+def regressor_for(
+    robot: Robot,
+    motions: Sequence[Motion],
+    settings: Settings,
+    relative_width: float | Array,
+    input_noise: InputNoise | None = None,
+) -> Regressor:
+    """The regressor asked for, its smooth signs as sharp as the motions allow."""
+    return build_regressor(
+        robot,
+        friction=with_widths(settings, motions, relative_width, input_noise),
+        couplings=settings.couplings,
+        quasi_static=bool(settings.quasi_static),
     )
+
+
+def make_motions(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    cutoff: float | None,
+    settings: Settings,
+    *,
+    moving_only: Mask | bool,
+    quick: bool,
+) -> tuple[Motion, ...]:
+    """The recordings smoothed, marked as standing where equations are left out; arguments as :func:`build_problem`."""
+    motions = [
+        make_motion(robot, recording, cutoff, smoothing=position_smoothing(recording, cutoff, settings), quick=quick)
+        for recording in recordings
+    ]
+    return tuple(dataclasses.replace(motion, standing=motion.standing & moving_only) for motion in motions)
 
 
 def _input_noise(recording: Recording, cutoff: float | None, settings: Settings) -> InputNoise | None:

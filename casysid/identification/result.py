@@ -16,6 +16,9 @@ from casysid.estimation import Estimate, Status
 from casysid.identifiability import BaseParameters
 from casysid.identification.cutoff import CutoffChoice
 from casysid.identification.delay import DelayChoice
+from casysid.identification.friction_choice import FrictionChoice
+from casysid.identification.friction_laws import broken_laws
+from casysid.identification.friction_model import model_to_json
 from casysid.identification.links import LinkProperties, link_properties
 from casysid.identification.prediction import TorqueError
 from casysid.identification.settings import Settings
@@ -41,6 +44,7 @@ class IdentificationResult:
         time_base: What was found of the recordings' clock.
         cutoff: The low-pass and why.
         delay: How late the torque was; taken out of all motions here, fitted and held out alike.
+        friction: What the data added to the friction that was asked for.
         regressor: Of which ``parameters`` are the coefficients.
         moments: Of the fitted recordings.
         estimate: The unconstrained estimate.
@@ -64,6 +68,7 @@ class IdentificationResult:
     time_base: TimeBase
     cutoff: CutoffChoice
     delay: DelayChoice
+    friction: FrictionChoice
     regressor: Regressor
     moments: Moments
     estimate: Estimate
@@ -104,11 +109,12 @@ class IdentificationResult:
     def negative_drive_parameters(self) -> tuple[str, ...]:
         """Names of friction and armature parameters that ought not to be negative, and are."""
         inertial = 10 * len(self.robot.links)
-        return tuple(
+        negative = [
             parameter.name
             for parameter, value in zip(self.regressor.parameters[inertial:], self.parameters[inertial:], strict=True)
             if parameter.non_negative and value < 0.0
-        )
+        ]
+        return (*negative, *broken_laws(self.regressor, self.parameters))
 
     @property
     def is_physically_consistent(self) -> bool:
@@ -201,6 +207,10 @@ class IdentificationResult:
             "friction_std": self.drive_std(),
             "friction_decided_by_data": self._by_drive(self.sources.by_data),
             "decided_by_the_file": list(self.sources.of_the_file),
+            "friction_model": {
+                **model_to_json(self.regressor),
+                "chosen": [one.to_json() for one in self.friction.chosen],
+            },
             "degrees_of_freedom": self.uncertainty.freedom,
             "input_noise": _noise_to_json(self.robot, self.input_noise),
             "diagnostics": dict(self.estimate.diagnostics),

@@ -2,6 +2,15 @@
 
 from casysid.report.html import render_report, write_report
 from casysid.report.noise import noise_table
-from casysid.report.tables import Table, drive_table, error_table, link_table
+from casysid.report.tables import Table, choice_table, drive_table, error_table, link_table
 
-__all__ = ["Table", "drive_table", "error_table", "link_table", "noise_table", "render_report", "write_report"]
+__all__ = [
+    "Table",
+    "choice_table",
+    "drive_table",
+    "error_table",
+    "link_table",
+    "noise_table",
+    "render_report",
+    "write_report",
+]

@@ -10,7 +10,7 @@ from pathlib import Path
 from casysid.identification import IdentificationResult
 from casysid.identification.verdict import judge
 from casysid.report.pictures import cutoff_figure, inline_png, torque_figure
-from casysid.report.tables import Table, drive_table, error_table, link_table, source_table
+from casysid.report.tables import Table, choice_table, drive_table, error_table, link_table, source_table
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,9 @@ def _sections(result: IdentificationResult) -> list[Section]:
             lines=(", ".join(result.sources.of_the_file),),
         ),
     ]
+    if result.friction.chosen:
+        words = f"Of {result.friction.asked} candidates; errors in cross-validation over stretches of time."
+        sections.append(Section("Choice of friction", words, table=choice_table(result)))
     if len(result.cutoff.candidates):
         sections.append(
             Section("Choice of the low-pass", result.cutoff.reason, picture=inline_png(cutoff_figure(result)))

@@ -108,3 +108,12 @@ def drive_table(result: IdentificationResult) -> Table:
     kinds += sorted({kind for row in table.values() for kind in row} - set(JOINT_KINDS))
     rows = tuple((owner, *(number(row.get(kind)) for kind in kinds)) for owner, row in table.items())
     return Table(("joint", *kinds), rows)
+
+
+def choice_table(result: IdentificationResult) -> Table:
+    """What the data added to friction, with the held-out error of its joints in cross-validation."""
+    rows = tuple(
+        (" and ".join(one.joints), one.words, percent(one.error_before), percent(one.error_after))
+        for one in result.friction.chosen
+    )
+    return Table(("joint", "added by the data", "held-out error without", "and with"), rows)

@@ -4,7 +4,7 @@ from casysid.validation.exciting import Excitation
 from casysid.validation.output import write_rehearsal
 from casysid.validation.perturbation import hidden_truth
 from casysid.validation.playback import DesignedMotion, Playback, play
-from casysid.validation.prediction import Validation, read_delays, read_drives, validate
+from casysid.validation.prediction import Validation, read_delays, read_drives, read_friction, validate
 from casysid.validation.rehearsal import Rehearsal, RehearsalSettings, rehearse
 from casysid.validation.tracking import Tracking, measure_tracking, track
 from casysid.validation.truth import BaseComparison, compare_base_parameters, true_coefficients, true_torque_error
@@ -24,6 +24,7 @@ __all__ = [
     "play",
     "read_delays",
     "read_drives",
+    "read_friction",
     "rehearse",
     "track",
     "true_coefficients",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.dynamics import Coulomb, Coupling, Regressor, build_regressor
+from casysid.dynamics import DEFAULT_FRICTION, Coupling, Regressor, build_regressor, with_width
 from casysid.errors import ParameterError
 from casysid.identification import CutoffChoice, Settings, TorqueError, choose_cutoff, torque_error
+from casysid.identification.friction_model import FrictionModel, model_from_json
 from casysid.identification.problem import USUAL_WIDTH, coulomb_width, make_motion
 from casysid.recording import Recording
 from casysid.robot import Robot
@@ -71,6 +71,7 @@ def validate(
     *,
     drives: Drives | None = None,
     delays: Mapping[str, float] | None = None,
+    friction: FrictionModel | None = None,
     cutoff: float | None = None,
     progress: Callable[[str, float], None] = lambda stage, share: None,
 ) -> Validation:
@@ -81,6 +82,8 @@ def validate(
         recordings: At least one.
         drives: Friction, offset and armature to take instead of the file's, which has no place for all of them.
         delays: By how much the logged torque is late, by joint [s].
+        friction: Columns and couplings that ``drives`` are the parameters of; None takes the default columns, as wide
+            as the motions ask, and couplings by their names.
         cutoff: Low-pass [Hz] of motion and torque; None lets the data choose.
         progress: Told the stage and the share done.
 
@@ -89,18 +92,15 @@ def validate(
     """
     if not recordings:
         raise ParameterError("validate: at least one recording is needed; got none")
-    settings = Settings(cutoff=cutoff, couplings=_couplings(robot, drives or {}))
+    model = friction or FrictionModel(DEFAULT_FRICTION, _couplings(robot, drives or {}))
+    settings = Settings(cutoff=cutoff, friction=model.columns, couplings=model.couplings)
     late = np.array([(delays or {}).get(dof, 0.0) for dof in robot.dofs])
     recordings = [aligned(recording, late) for recording in recordings]
     choice = choose_cutoff(robot, recordings, settings, progress=lambda share: progress("cut-off", share))
     progress("predict", 0.0)
     motions = [make_motion(robot, recording, choice.cutoff) for recording in recordings]
-    width = tuple(coulomb_width(motions, USUAL_WIDTH).tolist())
-    friction = tuple(
-        dataclasses.replace(column, width=width) if isinstance(column, Coulomb) else column
-        for column in settings.friction
-    )
-    regressor = build_regressor(robot, friction=friction, couplings=settings.couplings)
+    columns = model.columns if friction else with_width(model.columns, coulomb_width(motions, USUAL_WIDTH).tolist())
+    regressor = build_regressor(robot, friction=columns, couplings=model.couplings)
     parameters = parameters_with_drives(regressor, drives or {})
     errors = [torque_error(regressor, parameters, [motion], choice.cutoff) for motion in motions]
     progress("predict", 1.0)
@@ -161,6 +161,19 @@ def read_delays(path: Path) -> Mapping[str, float]:
         return {str(joint): float(late) for joint, late in content.get("delay", {}).get("seconds", {}).items()}
     except (OSError, ValueError, AttributeError, TypeError) as error:
         raise ParameterError(f"{path}: wanted the result.json of an identification; {error!r}") from error
+
+
+def read_friction(path: Path) -> FrictionModel | None:
+    """The friction columns and couplings of a ``result.json``; None for one that does not hold them.
+
+    Raises:
+        ParameterError: The file cannot be read, or its columns are not casysid's own.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return model_from_json(content["friction_model"]) if "friction_model" in content else None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ParameterError(f"{path}: its 'friction_model' is not that of an identification; {error!r}") from error
 
 
 def _couplings(robot: Robot, drives: Drives) -> tuple[Coupling, ...]:

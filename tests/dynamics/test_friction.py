@@ -80,7 +80,7 @@ def test_a_coupling_acts_on_all_its_joints_by_weight():
     coupling = Coupling(joints=("joint_2", "joint_3"), weights=(1.0, -2.0))
     friction = (Viscous(), Coulomb(width=(0.1, 0.2, 0.3)), Offset(), Armature())
     regressor = build_regressor(WRIST, friction, [coupling])
-    names = ["joint_2+joint_3.viscous", "joint_2+joint_3.coulomb", "joint_2+joint_3.armature"]
+    names = ["joint_2-joint_3.viscous", "joint_2-joint_3.coulomb", "joint_2-joint_3.armature"]
     assert list(regressor.names[42:]) == names  # its offset is a sum of its joints' offsets
     c = np.array([0.0, 1.0, -2.0])
     wanted = np.stack([v @ c, np.tanh(v @ c / 0.8), a @ c], axis=-1)
