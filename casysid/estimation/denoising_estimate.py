@@ -1,8 +1,7 @@
 """From moments to an estimate by a de-noising regression: what Bayesian de-noising and Joint Factor Analysis share.
 
 Every joint's rows are weighted by its own noise, which is re-estimated from the fit until it settles; rows are taken
-relative to the prior, columns standardised, those that depend on others exactly left out, the model fitted, and all of
-it undone.
+relative to the prior, columns standardised, exact mixtures of others left out, the model fitted, and all of it undone.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from casysid.estimation.base import Estimate
 from casysid.estimation.denoising import STARTS, Start, denoise
 from casysid.estimation.denoising_em import DenoisingModel, GammaPrior, State
 from casysid.estimation.denoising_fit import DenoisingFit, Scale
-from casysid.estimation.generating_columns import find_generating_columns
+from casysid.estimation.mixtures import find_parts
 from casysid.estimation.standardise import StandardisedProblem, check_prior, estimate_noise_std, standardise
 from casysid.moments import Moments
 
@@ -86,9 +85,9 @@ class DenoisingEstimator(ABC):
         return self._to_estimate(fit, first.posterior.start_bounds, noise_std)
 
     def _columns(self, problem: StandardisedProblem) -> npt.NDArray[np.intp]:
-        """Those that generate the others; all, where there are too few rows to tell."""
+        """Without those that are mixtures of others; all, where there are too few rows to tell."""
         d = len(problem.live)
-        return find_generating_columns(problem.normal.xx).chosen if problem.normal.count > d else np.arange(d)
+        return find_parts(problem.normal.xx) if problem.normal.count > d else np.arange(d)
 
     def _fit(
         self, whole: StandardisedProblem, chosen: npt.NDArray[np.intp], before: DenoisingFit | None

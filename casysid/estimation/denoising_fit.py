@@ -21,7 +21,7 @@ from casysid.arrays import Array, frozen
 from casysid.estimation.denoising import state_from
 from casysid.estimation.denoising_em import DenoisingModel, State
 from casysid.estimation.denoising_posterior import DenoisingPosterior
-from casysid.estimation.generating_columns import weights_of
+from casysid.estimation.mixtures import weights_of
 from casysid.estimation.noise_split import split_noise
 from casysid.estimation.selection import conditional_covariance
 from casysid.estimation.standardise import NOISE_FLOOR, StandardisedProblem, seen_directions
@@ -53,7 +53,7 @@ class Scale:
 
 @dataclass(frozen=True, eq=False)
 class DenoisingFit:
-    """A posterior with the problem it belongs to; r columns generate all d; arrays in the problem's standardised units.
+    """A posterior with the problem it belongs to, d columns of which the model saw r; arrays in standardised units.
 
     Attributes:
         whole: Joints weighted and pooled, relative to the prior, standardised.
@@ -107,9 +107,9 @@ class DenoisingFit:
     def metric(self) -> Array:
         """``G = Σ x xᵀ / σ² + N E[noise noiseᵀ]``, the paper's Eq. (8) as printed, in the regressor's units, (p, p).
 
-        Columns that depend on others have their noise. The noise is that of relevant columns: in one that is switched
-        off the model takes everything for noise, which says that it is not used and not that it is noise; with it, a
-        projection would give up torque to keep useless columns where they are.
+        Mixtures of other columns have the noise of their parts. The noise is that of relevant columns: in one that is
+        switched off the model takes everything for noise, which says that it is not used and not that it is noise; with
+        it, a projection would give up torque to keep useless columns where they are.
         """
         metric: Array = self.whole.metric * self.whole.noise_std[0] ** 2  # pooled rows were divided by σ before
         live = self.whole.live

@@ -33,7 +33,7 @@ class Comparison:
         )
 
     def to_json(self) -> dict[str, object]:
-        """Error by joint, consistency, rank and seconds of every method."""
+        """Error by joint, consistency, rank, seconds, why the estimator stopped, and its diagnostics, by method."""
         content: dict[str, object] = {name: _figures(result) for name, result in self.results.items()}
         content.update({name: {"failed": reason} for name, reason in self.failures.items()})
         return content
@@ -67,6 +67,7 @@ def _figures(result: IdentificationResult) -> dict[str, object]:
         "physically_consistent": result.is_physically_consistent,
         "rank": result.estimate.rank,
         "status": result.status.value,
+        "stopped": result.estimate.status.value,
         "seconds": sum(seconds),
         "diagnostics": dict(result.estimate.diagnostics),
     }

@@ -53,3 +53,13 @@ def test_a_trial_can_be_run_again_and_selection_beats_least_squares_among_irrele
     assert tuple(errors) == METHODS
     assert errors == run(2, 0, 0, 1000, 0, METHODS)
     assert errors["stepwise"][0] < errors["ols"][0]
+
+
+def test_the_sensitivity_to_starts_is_measured_on_the_same_problems(scripts) -> None:
+    sensitivity = scripts("measure_start_sensitivity")
+    errors = sensitivity.measure(200, 5, 90, 1, 0)
+    assert list(errors) == ["default", "1%", "5%", "10%", "20%", "40%", "80%"]
+    rows = list(sensitivity.cells([200, 1000]))
+    assert len(rows) == 16
+    assert rows[0] == (200, 2, 0)
+    assert max(errors.values()) < 2.0 * errors["default"]
