@@ -4,6 +4,7 @@ from casysid.identification.bands import torque_band
 from casysid.identification.comparison import Comparison, compare
 from casysid.identification.cutoff import CutoffChoice, choose_cutoff
 from casysid.identification.links import LinkProperties
+from casysid.identification.mistakes import Mistake, MistakeKind, find_mistakes
 from casysid.identification.pipeline import Preparation, identify, prepare, solve
 from casysid.identification.prediction import TorqueError, torque_error
 from casysid.identification.result import IdentificationResult
@@ -16,12 +17,15 @@ __all__ = [
     "Excitation",
     "IdentificationResult",
     "LinkProperties",
+    "Mistake",
+    "MistakeKind",
     "Preparation",
     "Settings",
     "Sources",
     "TorqueError",
     "choose_cutoff",
     "compare",
+    "find_mistakes",
     "identify",
     "prepare",
     "solve",

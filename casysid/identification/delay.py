@@ -34,7 +34,7 @@ CLEAR_GAIN = 2.5
 WORTHWHILE_GAIN = 1e-3
 """And this share of the squared error."""
 OWN_GAIN = 0.5
-"""Joints get delays of their own for no less than this share, for their friction and elasticity look like delays, too."""
+"""Joints get their own for no less than this share: their friction and elasticity look like delays, too."""
 FOLDS = 5
 STEPS, CONVERGED = 20, 1e-3
 """Of Gauss-Newton; converged when a step is less than this many samples."""

@@ -19,6 +19,7 @@ from casysid.identification.cutoff import COARSE_STEP, FINE_STEP, CutoffChoice, 
 from casysid.identification.delay import DelayChoice, choose_delay, given_delay
 from casysid.identification.friction_choice import FrictionChoice, choose_friction
 from casysid.identification.friction_laws import friction_laws
+from casysid.identification.mistakes import Mistake, find_mistakes
 from casysid.identification.prediction import torque_error
 from casysid.identification.problem import (
     USUAL_WIDTH,
@@ -55,6 +56,7 @@ class Preparation:
     Attributes:
         robot: The robot.
         time_base: What was found of the recordings' clock.
+        mistakes: What in the recordings contradicts the model file.
         cutoff: The low-pass and why.
         delay: How late the torque is, and what was taken out of all recordings.
         friction: What the data added to the friction that was asked for.
@@ -66,6 +68,7 @@ class Preparation:
 
     robot: Robot
     time_base: TimeBase
+    mistakes: tuple[Mistake, ...]
     cutoff: CutoffChoice
     delay: DelayChoice
     friction: FrictionChoice
@@ -121,6 +124,9 @@ def prepare(
     settings = dataclasses.replace(settings, quasi_static=time_base.quasi_static)
     fitted = tuple(recording.with_time_scaled(time_base.scale) for recording in fitted)
     unseen = tuple(recording.with_time_scaled(time_base.scale) for recording in held_out)
+    mistakes = find_mistakes(robot, fitted)
+    for mistake in mistakes:
+        warnings.warn(mistake.sentence, CasysidWarning, stacklevel=3)
     cutoff, delay, width, moving_only, friction = _settle(robot, fitted, settings, progress)
     fitted, unseen = (tuple(aligned(one, delay.seconds) for one in several) for several in (fitted, unseen))
     clock.lap("tuning")
@@ -135,7 +141,7 @@ def prepare(
     structural = structural_base_parameters(problem.regressor)
     clock.lap("moments")
     progress("moments", 1.0)
-    return Preparation(robot, time_base, cutoff, delay, friction, problem, predicted, structural, clock.laps)
+    return Preparation(robot, time_base, mistakes, cutoff, delay, friction, problem, predicted, structural, clock.laps)
 
 
 def solve(preparation: Preparation, settings: Settings, *, progress: Progress = silent) -> IdentificationResult:
@@ -155,6 +161,7 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
         robot=preparation.robot,
         settings=settings,
         time_base=preparation.time_base,
+        mistakes=preparation.mistakes,
         cutoff=preparation.cutoff,
         delay=preparation.delay,
         friction=preparation.friction,

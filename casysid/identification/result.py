@@ -20,6 +20,7 @@ from casysid.identification.friction_choice import FrictionChoice
 from casysid.identification.friction_laws import broken_laws
 from casysid.identification.friction_model import model_to_json
 from casysid.identification.links import LinkProperties, link_properties
+from casysid.identification.mistakes import Mistake
 from casysid.identification.prediction import TorqueError
 from casysid.identification.settings import Settings
 from casysid.identification.sources import Sources, sources_of
@@ -42,6 +43,7 @@ class IdentificationResult:
         robot: The robot as its file describes it.
         settings: What was asked for.
         time_base: What was found of the recordings' clock.
+        mistakes: What in the recordings contradicts the model file, if anything; nothing was changed for it.
         cutoff: The low-pass and why.
         delay: How late the torque was; taken out of all motions here, fitted and held out alike.
         friction: What the data added to the friction that was asked for.
@@ -66,6 +68,7 @@ class IdentificationResult:
     robot: Robot
     settings: Settings
     time_base: TimeBase
+    mistakes: tuple[Mistake, ...]
     cutoff: CutoffChoice
     delay: DelayChoice
     friction: FrictionChoice
@@ -177,6 +180,7 @@ class IdentificationResult:
                 "motion_band_hz": self.cutoff.motion_band,
                 "reason": self.cutoff.reason,
             },
+            "mistakes": [mistake.to_json() for mistake in self.mistakes],
             "delay": self.delay.to_json(by_joint),
             "relative_error": {
                 "train": self.train.relative,

@@ -10,7 +10,15 @@ from pathlib import Path
 from casysid.identification import IdentificationResult
 from casysid.identification.verdict import judge
 from casysid.report.pictures import cutoff_figure, inline_png, torque_figure
-from casysid.report.tables import Table, choice_table, drive_table, error_table, link_table, source_table
+from casysid.report.tables import (
+    Table,
+    choice_table,
+    drive_table,
+    error_table,
+    link_table,
+    mistake_table,
+    source_table,
+)
 
 
 @dataclass(frozen=True)
@@ -101,6 +109,15 @@ def _sections(result: IdentificationResult) -> list[Section]:
     if result.friction.chosen:
         words = f"Of {result.friction.asked} candidates; errors in cross-validation over stretches of time."
         sections.append(Section("Choice of friction", words, table=choice_table(result)))
+    if result.mistakes:
+        sections.insert(
+            0,
+            Section(
+                "The log against the model file",
+                "Signs, units or orders of columns that would explain the log far better. Nothing was changed for it.",
+                table=mistake_table(result.mistakes),
+            ),
+        )
     if len(result.cutoff.candidates):
         sections.append(
             Section("Choice of the low-pass", result.cutoff.reason, picture=inline_png(cutoff_figure(result)))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from casysid.dynamics import build_regressor
 from casysid.identifiability import structural_base_parameters
+from casysid.identification.mistakes import find_mistakes
 from casysid.inertia import mass_properties, smallest_eigenvalue
 from casysid.recording import Recording
-from casysid.report.tables import Table, number
+from casysid.report.tables import Table, mistake_table, number
 from casysid.robot import Robot
 from casysid.signals import motion_band, position_noise
 
@@ -28,7 +29,16 @@ def recording_tables(robot: Robot, recording: Recording) -> list[tuple[str, Tabl
         ("stretches between gaps", str(summary.segments)),
         ("columns not used", ", ".join(summary.unused_columns) or "–"),
     ]
-    return [("Recording", Table(("", ""), tuple(rows))), ("Channels", _channels(recording))]
+    return [
+        ("Recording", Table(("", ""), tuple(rows))),
+        ("Channels", _channels(recording)),
+        ("Signs, units and order of columns against the model file", _against_file(robot, recording)),
+    ]
+
+
+def _against_file(robot: Robot, recording: Recording) -> Table:
+    mistakes = find_mistakes(robot, [recording])
+    return mistake_table(mistakes) if mistakes else Table(("",), (("nothing looks wrong",),))
 
 
 def _joints(robot: Robot) -> Table:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from casysid.identification import IdentificationResult
+from casysid.identification.mistakes import Mistake
 from casysid.identification.result import JOINT_KINDS
 from casysid.inertia import KINDS
 
@@ -65,6 +67,15 @@ def error_table(result: IdentificationResult) -> Table:
         for k, dof in enumerate(result.robot.dofs)
     ]
     return Table(("joint", "fitted", "held out", "model file", "RMS error [N m]"), tuple(rows))
+
+
+def mistake_table(mistakes: Sequence[Mistake]) -> Table:
+    """What in a log contradicts the model file, and how well the file explains the torque either way."""
+    rows = tuple(
+        ("; or: ".join((one.words, *one.alternatives)), *(percent(share) for share in one.explained))
+        for one in mistakes
+    )
+    return Table(("what looks wrong", "explained as logged", "explained if so corrected"), rows)
 
 
 def link_table(result: IdentificationResult) -> Table:

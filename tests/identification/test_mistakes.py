@@ -1,0 +1,159 @@
+"""Mistakes of sign, unit and order are named; a merely bad model file accuses nobody."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from casysid.dynamics import build_regressor
+from casysid.errors import CasysidWarning
+from casysid.identification import MistakeKind, Settings, find_mistakes, identify
+from casysid.recording import Recording, read_recording
+from casysid.robot import Robot
+from casysid.simulation import design_sinusoids
+from tests.simulated import bundled_robot
+
+REAL = Path(__file__).parents[3] / "shared" / "data"
+RATE, DURATION = 200.0, 10.0
+LOGS = {
+    "emps": ("emps.urdf", "estimation"),
+    "staubli_tx40": ("tx40.urdf", "excitation_9s_joint"),
+    "kuka_iiwa14_lasa": ("iiwa14.urdf", "motion_30s"),
+    "rokae_xmate3pro": ("xmate3pro.urdf", "excitation_20s"),
+    "airbot_play": ("airbot_play.urdf", "chirp"),
+    "kuka_kr300": ("kuka_kr300.urdf", "traj_A"),
+    "kuka_med7_slow": ("med7.urdf", "measurements"),
+    "dfki_double_pendulum": ("design_C1.urdf", "design_C1_143339"),
+}
+
+
+def clean_log(name, seed=0):
+    robot = bundled_robot(name)
+    time = np.arange(0.0, DURATION, 1 / RATE)
+    reference = design_sinusoids(robot, duration=DURATION, seed=seed, band=(0.1, 1.5)).sample(time)
+    regressor = build_regressor(robot)
+    tau = regressor.predict(regressor.prior, reference.q, reference.v, reference.a)
+    rng = np.random.default_rng(seed)
+    return Recording(
+        channels=robot.channels,
+        dofs=robot.dofs,
+        time=time,
+        position=reference.channels + 1e-4 * rng.normal(size=reference.channels.shape),
+        torque=tau + 0.03 * tau.std(axis=0) * rng.normal(size=tau.shape),
+    )
+
+
+def with_wrong_masses(robot, seed):
+    """The robot as a file that is 30 % off tells it."""
+    factors = np.random.default_rng(seed).uniform(0.7, 1.3, (len(robot.links), 1))
+    return robot.with_parameters(inertial_parameters=(robot.inertial_parameters.reshape(-1, 10) * factors).ravel())
+
+
+def changed(recording, q=lambda q: None, tau=lambda tau: None):
+    position, torque = recording.position.copy(), recording.torque.copy()
+    q(position)
+    tau(torque)
+    return dataclasses.replace(recording, position=position, torque=torque)
+
+
+def negate(column):
+    def change(values):
+        values[:, column] *= -1
+
+    return change
+
+
+def swap(first, second):
+    def change(values):
+        values[:, [first, second]] = values[:, [second, first]]
+
+    return change
+
+
+def scale(column, factor):
+    def change(values):
+        values[:, column] *= factor
+
+    return change
+
+
+def shift(column, offset):
+    def change(values):
+        values[:, column] += offset
+
+    return change
+
+
+MISTAKES = [
+    (MistakeKind.TORQUE_NEGATED, {"tau": negate(1)}, {1}),
+    (MistakeKind.POSITION_NEGATED, {"q": negate(1)}, {1}),
+    (MistakeKind.AXIS_NEGATED, {"q": negate(1), "tau": negate(1)}, {1}),
+    (MistakeKind.ALL_TORQUES_NEGATED, {"tau": negate(slice(None))}, None),
+    (MistakeKind.TORQUES_SWAPPED, {"tau": swap(0, 1)}, {0, 1}),
+    (MistakeKind.POSITIONS_SWAPPED, {"q": swap(0, 1)}, {0, 1}),
+    (MistakeKind.JOINTS_SWAPPED, {"q": swap(0, 1), "tau": swap(0, 1)}, {0, 1}),
+    (MistakeKind.ZERO_SHIFTED, {"q": shift(1, np.pi / 2)}, {1}),
+    (MistakeKind.DEGREES, {"q": scale(slice(None), 180 / np.pi)}, None),
+    (MistakeKind.SCALE, {"tau": scale(1, 1000.0)}, {1}),
+    (MistakeKind.SCALE, {"tau": scale(1, 0.01)}, {1}),
+]
+
+
+@pytest.mark.parametrize("name", ["two_link.urdf", "head.urdf"])
+@pytest.mark.parametrize(("kind", "changes", "joints"), MISTAKES)
+def test_one_mistake_is_named_with_its_joints_though_the_file_is_wrong(name, kind, changes, joints):
+    robot = bundled_robot(name)
+    mistakes = find_mistakes(with_wrong_masses(robot, 1), [changed(clean_log(name), **changes)])
+    assert [mistake.kind for mistake in mistakes] == [kind]
+    mistake = mistakes[0]
+    wanted = robot.dofs if joints is None else tuple(robot.dofs[k] for k in sorted(joints))
+    alternatives = " ".join(mistake.alternatives)
+    assert set(wanted) == set(mistake.joints) or all(dof in alternatives for dof in wanted)
+    if kind is not MistakeKind.SCALE:
+        assert mistake.explained[1] > max(mistake.explained[0], 0.8)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.sampled_from(["two_link.urdf", "scara.urdf", "head.urdf"]), st.integers(0, 2**32 - 1), st.integers(0, 2))
+def test_a_file_whose_masses_are_wrong_accuses_nobody(name, seed, log):
+    assert find_mistakes(with_wrong_masses(bundled_robot(name), seed), [clean_log(name, log)]) == ()
+
+
+def test_two_mistakes_are_found_one_after_the_other():
+    robot, log = bundled_robot("head.urdf"), clean_log("head.urdf")
+    mistakes = find_mistakes(robot, [changed(log, tau=lambda tau: [negate(1)(tau), negate(2)(tau)])])
+    assert {(one.kind, one.joints) for one in mistakes} == {
+        (MistakeKind.TORQUE_NEGATED, (robot.dofs[1],)),
+        (MistakeKind.TORQUE_NEGATED, (robot.dofs[2],)),
+    }
+
+
+def test_samples_without_time_are_searched_as_well():
+    robot = bundled_robot("two_link.urdf")
+    rng = np.random.default_rng(0)
+    q, v, a = rng.uniform(-1, 1, (3, 400, 2))
+    regressor = build_regressor(robot)
+    tau = regressor.predict(regressor.prior, q, v, a) * [1, -1]
+    log = Recording(channels=robot.channels, dofs=robot.dofs, position=q, velocity=v, acceleration=a, torque=tau)
+    (mistake,) = find_mistakes(robot, [log])
+    assert mistake.words == f"tau of {robot.dofs[1]} looks negated"
+
+
+def test_identify_warns_and_changes_nothing():
+    robot, log = bundled_robot("two_link.urdf"), changed(clean_log("two_link.urdf"), tau=negate(1))
+    with pytest.warns(CasysidWarning, match=f"tau of {robot.dofs[1]} looks negated.*Nothing was changed"):
+        result = identify(robot, log, Settings(cutoff=6.0, delay=0.0))
+    assert result.to_json()["mistakes"][0]["kind"] == "torque_negated"
+    np.testing.assert_array_equal(result.train_motions[0].tau, log.torque)
+
+
+@pytest.mark.skipif(not REAL.is_dir(), reason="the real robots' logs are not there")
+@pytest.mark.filterwarnings("ignore::casysid.errors.CasysidWarning")  # of their model files
+@pytest.mark.parametrize("folder", LOGS)
+def test_real_logs_are_not_accused(folder):
+    urdf, log = LOGS[folder]
+    robot = Robot.from_file(REAL / folder / urdf)
+    assert find_mistakes(robot, [read_recording(REAL / folder / f"{log}.csv.gz", robot)]) == ()
