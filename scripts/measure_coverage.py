@@ -35,7 +35,7 @@ from casysid.arrays import Array
 from casysid.bundled import find_model
 from casysid.dynamics import DEFAULT_FRICTION, Armature, Coulomb, FrictionColumn
 from casysid.estimation import WeightedLeastSquares
-from casysid.identification import IdentificationResult, Settings, identify, torque_band
+from casysid.identification import IdentificationResult, Settings, prepare, solve, torque_band
 from casysid.inertia import inertial_parameters, mass_properties
 from casysid.recording import Recording
 from casysid.robot import Robot
@@ -162,10 +162,9 @@ def examine(name: str, dry: bool, seed: int) -> dict[str, dict[str, list[float]]
     case = case_of(name, dry)
     recording = record(case, seed)
     file = wrong_file(case.plant.robot, np.random.default_rng([seed, 2]))
-    return {
-        way: covered(identify(file, recording, settings, held_out=[unseen_recording(name, dry)]), case.plant)
-        for way, settings in settings_of(case).items()
-    }
+    ways = settings_of(case)
+    preparation = prepare(file, recording, ways["ridge, projected"], held_out=[unseen_recording(name, dry)])
+    return {way: covered(solve(preparation, settings), case.plant) for way, settings in ways.items()}
 
 
 def covered(result: IdentificationResult, plant: Plant) -> dict[str, list[float]]:
