@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError
+from casysid.excitation.series import check_joints
 from casysid.robot import JointKind, Robot
 
 FREE_RANGE = {True: 0.3, False: np.pi}
@@ -101,8 +102,9 @@ def limits_of(
         jerk: Largest [rad/s³, m/s³], likewise.
 
     Raises:
-        ParameterError: A share is not above 0 and up to 1, or a joint has no room to move.
+        ParameterError: A share is not above 0 and up to 1, or a joint has no room to move or not one degree of freedom.
     """
+    check_joints(robot)
     for name, share in (("position", position_share), ("velocity", velocity_share), ("torque", torque_share)):
         if not 0.0 < share <= 1.0:
             raise ParameterError(f"limits: {name}_share must be above 0 and at most 1; got {share}")

@@ -178,3 +178,11 @@ def test_limits_that_a_model_lacks_are_assumed_and_named():
     assert any("'joint_1' has no position limits" in note for note in limits.assumed)
     assert any("'joint_2' has no velocity limit" in note for note in limits.assumed)
     assert set(limits.assumed) <= set(build_excitation(robot, series=SERIES, capsules=[]).notes)
+
+
+@pytest.mark.parametrize("kind", [JointKind.FREE_FLYER, JointKind.SPHERICAL, JointKind.PLANAR])
+def test_joints_with_more_degrees_of_freedom_are_refused_by_name(kind):
+    robot = random_robot(np.random.default_rng(0), [kind, JointKind.REVOLUTE])
+    for attempt in (limits_of, build_excitation):
+        with pytest.raises(ParameterError, match=f"joint 'joint_1' is {kind.value}; only joints with one degree"):
+            attempt(robot)
