@@ -81,7 +81,7 @@ class DelayChoice:
         }
 
 
-def given_delay(robot: Robot, seconds: float, reason: str = "given") -> DelayChoice:
+def given_delay(robot: Robot, seconds: float, reason: str = "none") -> DelayChoice:
     """One delay for all joints that nobody estimated."""
     all_joints = frozen(np.full(robot.nv, seconds))
     return DelayChoice(
@@ -111,7 +111,7 @@ def choose_delay(
     if settings.delay is not None:
         if cutoff is None and settings.delay:
             raise RecordingError("delay: samples without time have none; leave the delay out, or give time stamps")
-        return given_delay(robot, settings.delay)
+        return given_delay(robot, settings.delay, f"{1e3 * settings.delay:.3g} ms, given")
     if cutoff is None:
         return given_delay(robot, 0.0, "samples without time have none")
     found = _Search(robot, recordings, cutoff, settings, relative_width).run()

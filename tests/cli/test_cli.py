@@ -66,7 +66,7 @@ def test_every_method_has_a_name(log, tmp_path, method):
 def test_info_shows_robot_and_recording(log):
     answer = run("info", URDF, log)
     assert answer.exit_code == 0, answer.output
-    for word in ("Joints", "Links", "Identifiable combinations", "rate [Hz]", "noise (std)"):
+    for word in ("Joints", "Links", "Identifiable combinations", "rate [Hz]", "noise (std)", "nothing looks wrong"):
         assert word in answer.stdout
 
 
@@ -101,6 +101,7 @@ BAD_INPUT = {
     "an unknown method": ([URDF, "LOG", "--method", "magic"], "method must be one of"),
     "a split above one": ([URDF, "LOG", "--split", "1.5"], "between 0 and 1"),
     "a negative cut-off": ([URDF, "LOG", "--cutoff", "-3"], "positive number of Hz"),
+    "a delay that is not a number": ([URDF, "LOG", "--delay", "soon"], "--delay wants auto or a number of seconds"),
     "gravity that is not a number": ([URDF, "LOG", "--gravity", "0", "0", "nan"], "gravity"),
     "an unknown joint to lock": ([URDF, "LOG", "--lock", "elbowww=0"], "elbowww"),
     "a lock without a number": ([URDF, "LOG", "--lock", "joint_2"], "JOINT=VALUE"),

@@ -148,7 +148,7 @@ def test_a_given_delay_is_taken_as_it_is():
     robot, recording, *_ = late_recording("two_link.urdf", 0.0, duration=4.0)
     choice = choose_delay(robot, [recording], CUTOFF, Settings(delay=0.003), USUAL_WIDTH)
     np.testing.assert_array_equal(choice.seconds, 0.003)
-    assert choice.reason == "given"
+    assert choice.reason == "3 ms, given"
 
 
 def test_samples_without_time_have_no_delay():
