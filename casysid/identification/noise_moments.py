@@ -26,6 +26,8 @@ from casysid.signals import InputNoise
 
 DRAWS = 2
 """Pairs of opposite noise whose growth is averaged, where the positions are smoothed."""
+LONG = 50_000
+"""So many samples average well enough by themselves: one pair will do."""
 DRAWS_AS_LOGGED = 4
 EXPECTED_KINDS = (Coulomb.kind,)
 """Columns that are an expectation, given the noisy motion, and not a noisy value."""
@@ -69,7 +71,7 @@ def noise_moments(
                 )
         return total / (2 * draws) - gram
 
-    draws = DRAWS_AS_LOGGED if as_logged else DRAWS
+    draws = DRAWS_AS_LOGGED if as_logged else DRAWS if sum(map(len, recordings)) < LONG else 1
     added = 3.0 * growth(1.0) - growth(np.sqrt(2.0)) if as_logged else growth(1.0)
     if not as_logged:
         expected = [m for m, parameter in enumerate(regressor.parameters) if parameter.kind in EXPECTED_KINDS]
