@@ -5,6 +5,10 @@
 Every row is a number of training rows, an input signal-to-noise ratio and a number of redundant inputs; every column
 the only start, which takes that share of each input for noise. Shown is the normalised squared error on noiseless test
 rows, mean over the trials; "default" is the estimator as it comes, which keeps the best of its own starts.
+
+Found (three trials; one with 10 000 rows): with 10 000 rows every start ends in the same place. With 200 and 1000 rows
+starts of 5 to 40 % are within one per cent of the default in 15 of 16 cells, of 80 % in 15; the exception is 10 %
+better. The start of 1 % is the least certain: in two cells it is a quarter and a third worse, in two 4 and 13 % better.
 """
 
 from __future__ import annotations
