@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import operator
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -85,7 +86,8 @@ class Experiment:
     @property
     def settings(self) -> Settings:
         """The regressor's drive columns; one thread, for processes run beside each other."""
-        return Settings(friction=(Viscous(),) if self.paper_features else DEFAULT_FRICTION, threads=1)
+        friction = (Viscous(),) if self.paper_features else DEFAULT_FRICTION
+        return Settings(friction=friction, threads=1, blocks=4)  # at least so many in each piece
 
     def build_plant(self) -> Plant:
         """The machine, its sensors as noisy as asked for."""
@@ -193,13 +195,14 @@ class Recorded:
             return dataclasses.replace(problem, motions=())
         settings, motions = self.experiment.settings, [self._logged(path) for path in self.pieces]
         regressor = build_regressor(self.plant.robot, friction=with_widths(settings, motions, USUAL_WIDTH))
-        moments = sum_moments(regressor, motions, None, settings)
-        grown = [
-            sum_moments(regressor, [self._disturbed(motion, sign) for motion in motions], None, settings).gram
-            for sign in (1.0, -1.0)
-        ]
-        noise = 0.5 * (grown[0] + grown[1]) - moments.gram
-        return LinearProblem(regressor, (), dataclasses.replace(moments, noise=noise), None)
+        parts = []
+        for motion in motions:  # one by one: all disturbed motions at once would take much memory
+            here = sum_moments(regressor, [motion], None, settings)
+            grown = [
+                sum_moments(regressor, [self._disturbed(motion, sign)], None, settings).gram for sign in (1.0, -1.0)
+            ]
+            parts.append(dataclasses.replace(here, noise=0.5 * (grown[0] + grown[1]) - here.gram))
+        return LinearProblem(regressor, (), functools.reduce(operator.add, parts), None)
 
     def _logged(self, path: Path) -> Motion:
         """The signals as the paper's authors had them."""

@@ -19,6 +19,7 @@ import multiprocessing
 import os
 import tempfile
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from pathlib import Path
@@ -50,24 +51,38 @@ PAPER = {
     },
 }
 
+FEW_SAMPLES = 100_000  # may be evaluated beside others
+
 Table = dict[str, dict[str, float]]  # method, measure
 
 
 def run_all(
     experiments: Sequence[Experiment], workers: int, folder: Path, advance: Callable[[str], None]
 ) -> dict[Experiment, Outcome]:
-    """Record and evaluate, spread over processes; ``advance`` is called after each piece of work."""
+    """Record and evaluate, spread over processes; ``advance`` is called after each piece of work.
+
+    Of long experiments one at a time is evaluated, which takes most of the memory, while others are recorded.
+    """
     os.environ["OMP_NUM_THREADS"] = "1"  # inherited by the processes, which would else fight for the cores
     outcomes: dict[Experiment, Outcome] = {}
+    recordings: dict[Experiment, list[Path]] = {experiment: [] for experiment in experiments}
+    to_record = deque((experiment, piece) for experiment in experiments for piece in range(PIECES))
+    to_evaluate: list[Experiment] = []
+    running: dict[Future[Path] | Future[Outcome], tuple[Experiment, bool]] = {}  # and whether it is an evaluation
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        recordings: dict[Experiment, list[Path]] = {experiment: [] for experiment in experiments}
-        pending: dict[Future[Path] | Future[Outcome], Experiment] = {}
-        for experiment in experiments:
-            for piece in range(PIECES):
-                pending[pool.submit(record_piece, experiment, piece, folder)] = experiment
-        while pending:
-            for future in wait(pending, return_when=FIRST_COMPLETED).done:
-                experiment, answer = pending.pop(future), future.result()
+        while running or to_record or to_evaluate:
+            while len(running) < workers:
+                evaluated = [experiment for experiment, evaluates in running.values() if evaluates]
+                if (experiment := _next_to_evaluate(to_evaluate, evaluated)) is not None:
+                    to_evaluate.remove(experiment)
+                    running[pool.submit(evaluate, experiment, sorted(recordings[experiment]))] = (experiment, True)
+                elif to_record:
+                    experiment, piece = to_record.popleft()
+                    running[pool.submit(record_piece, experiment, piece, folder)] = (experiment, False)
+                else:
+                    break
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                (experiment, _), answer = running.pop(future), future.result()
                 if isinstance(answer, Outcome):
                     outcomes[experiment] = answer
                     for path in recordings[experiment]:
@@ -75,9 +90,15 @@ def run_all(
                 else:
                     recordings[experiment].append(answer)
                     if len(recordings[experiment]) == PIECES:
-                        pending[pool.submit(evaluate, experiment, sorted(recordings[experiment]))] = experiment
+                        to_evaluate.append(experiment)
                 advance(experiment.robot)
     return outcomes
+
+
+def _next_to_evaluate(ready: Sequence[Experiment], running: Sequence[Experiment]) -> Experiment | None:
+    """The first that is ready, but no long one beside a long one."""
+    busy = any(one.samples > FEW_SAMPLES for one in running)
+    return next((one for one in ready if not busy or one.samples <= FEW_SAMPLES), None)
 
 
 def average(outcomes: Sequence[Outcome]) -> Table:
@@ -176,7 +197,7 @@ def write_text(text: str, path: Path) -> None:
 
 
 def plan(options: argparse.Namespace) -> tuple[list[Experiment], list[Experiment]]:
-    """The experiments of the tables and of the sweep; the longest first, so that no process waits for them."""
+    """The experiments of the tables and of the sweep; long and short ones in turn."""
     robots = [options.robot] if options.robot else ["arm", "head"]
     tables, sweep = [], []
     for name in robots:
@@ -186,6 +207,7 @@ def plan(options: argparse.Namespace) -> tuple[list[Experiment], list[Experiment
         if not options.no_sweep:
             few = dataclasses.replace(base, samples=max(samples // 10, 20_000), stride=1, seed=options.seeds)
             sweep += [dataclasses.replace(few, noise=factor) for factor in SWEEP]
+    tables.sort(key=lambda one: one.seed)
     return tables, sweep
 
 

@@ -66,3 +66,12 @@ def test_structured_noise_removal_beats_ridge_where_columns_are_noisy(robots, re
         model, _ = robots.METHODS[name](recorded)
         error[name] = np.sqrt(np.mean((model.inverse_dynamics(run.q, run.v, run.a) - run.tau) ** 2))
     assert error["errors in variables"] < error["ridge (cross-validated)"]
+
+
+def test_no_two_long_experiments_are_evaluated_at_once(robots):
+    tables = importlib.import_module("reproduce_tables")
+    long, other = (robots.Experiment("arm", 480.0, 500_000, 2, seed) for seed in (0, 1))
+    short = robots.Experiment("arm", 480.0, 50_000, 1, 3)
+    assert tables._next_to_evaluate([long, short], [other]) is short
+    assert tables._next_to_evaluate([long], [other]) is None
+    assert tables._next_to_evaluate([long, short], [short]) is long
