@@ -129,6 +129,7 @@ def build_regressor(
     couplings: Sequence[Coupling] = (),
     *,
     quasi_static: bool = False,
+    torque_gains: Sequence[float] | None = None,
 ) -> Regressor:
     """The regressor of a robot.
 
@@ -139,11 +140,17 @@ def build_regressor(
         couplings: Motors that act on several joints.
         quasi_static: Torques hold gravity and friction, but nothing inertial: for links velocity and acceleration, for
             drives acceleration count as zero.
+        torque_gains: Measured torque over true torque of every degree of freedom, shape (nv,); None is ones.
 
     Raises:
         ParameterError: When a kind of friction or a coupling is given twice, a coupling names an unknown joint, or a
-            column uses the position of a degree of freedom that has none.
+            column uses the position of a degree of freedom that has none; or gains are not nv positive numbers.
     """
+    gains = np.ones(robot.nv) if torque_gains is None else np.asarray(torque_gains, dtype=np.float64)
+    if gains.shape != (robot.nv,) or not (np.isfinite(gains).all() and (gains > 0.0).all()):
+        raise ParameterError(
+            f"torque gains: one positive number for each of {', '.join(robot.dofs)}; got {torque_gains}"
+        )
     kinds, coupled = [column.kind for column in friction], [coupling.name for coupling in couplings]
     if len(set(kinds)) != len(kinds) or len(set(coupled)) != len(coupled):
         raise ParameterError(f"friction: every kind and every coupling once; got {kinds} and {coupled}")
@@ -156,8 +163,9 @@ def build_regressor(
     parameters = (*_inertial_parameters(robot), *(parameter for parameter, _ in drive))
     rigid = robot.inertial_parameters.size
     theta = ca.SX.sym("parameters", len(parameters))
-    Y = ca.horzcat(symbolic.regressor(robot, motions), drive_matrix)
-    tau = symbolic.inverse_dynamics(robot, motions, theta[:rigid]) + drive_matrix @ theta[rigid:]
+    measured = ca.diag(constant(gains))
+    Y = measured @ ca.horzcat(symbolic.regressor(robot, motions), drive_matrix)
+    tau = measured @ (symbolic.inverse_dynamics(robot, motions, theta[:rigid]) + drive_matrix @ theta[rigid:])
     built = _regressor(robot, state, parameters, Y, theta, tau)
     return replace(built, friction=tuple(friction), couplings=tuple(couplings))
 

@@ -7,6 +7,7 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 from casysid.identification.standstill import choose_moving_only
 from casysid.identification.time_base import TimeBase, settle_time_base
+from casysid.identification.torque_gains import TorqueGains, settle_torque_gains
 from casysid.projection import ProjectionResult, build_projection, project
 from casysid.recording import Recording
 from casysid.robot import Robot
@@ -60,6 +62,7 @@ class Preparation:
         cutoff: The low-pass and why.
         delay: How late the torque is, and what was taken out of all recordings.
         friction: What the data added to the friction that was asked for.
+        torque_gains: Of the joints relative to each other, and why.
         problem: Regressor, motions and moments of the fitted recordings.
         held_out: Motions that are only predicted.
         structural: Base parameters of the mechanism.
@@ -72,6 +75,7 @@ class Preparation:
     cutoff: CutoffChoice
     delay: DelayChoice
     friction: FrictionChoice
+    torque_gains: TorqueGains
     problem: LinearProblem
     held_out: tuple[Motion, ...]
     structural: BaseParameters
@@ -131,9 +135,12 @@ def prepare(
     fitted, unseen = (tuple(aligned(one, delay.seconds) for one in several) for several in (fitted, unseen))
     clock.lap("tuning")
     progress("moments", 0.0)
-    problem = build_problem(
-        robot, fitted, cutoff.cutoff, friction.settings, relative_width=width, moving_only=moving_only
-    )
+    build = partial(build_problem, robot, fitted, cutoff.cutoff, relative_width=width, moving_only=moving_only)
+    problem = build(friction.settings)
+    gains = settle_torque_gains(problem.moments, problem.regressor.parameters, settings)
+    if gains.found:
+        warnings.warn(gains.reason, CasysidWarning, stacklevel=3)
+        problem = build(dataclasses.replace(friction.settings, torque_gains=tuple(gains.values)))
     predicted = tuple(
         make_motion(robot, one, cutoff.cutoff, smoothing=position_smoothing(one, cutoff.cutoff, settings))
         for one in unseen
@@ -141,7 +148,9 @@ def prepare(
     structural = structural_base_parameters(problem.regressor)
     clock.lap("moments")
     progress("moments", 1.0)
-    return Preparation(robot, time_base, mistakes, cutoff, delay, friction, problem, predicted, structural, clock.laps)
+    return Preparation(
+        robot, time_base, mistakes, cutoff, delay, friction, gains, problem, predicted, structural, clock.laps
+    )
 
 
 def solve(preparation: Preparation, settings: Settings, *, progress: Progress = silent) -> IdentificationResult:
@@ -165,6 +174,7 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
         cutoff=preparation.cutoff,
         delay=preparation.delay,
         friction=preparation.friction,
+        torque_gains=preparation.torque_gains,
         regressor=regressor,
         moments=problem.moments,
         estimate=estimate,

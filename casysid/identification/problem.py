@@ -136,6 +136,7 @@ def regressor_for(
         friction=with_widths(settings, motions, relative_width, input_noise),
         couplings=settings.couplings,
         quasi_static=bool(settings.quasi_static),
+        torque_gains=settings.torque_gains,
     )
 
 

@@ -25,6 +25,7 @@ from casysid.identification.prediction import TorqueError
 from casysid.identification.settings import Settings
 from casysid.identification.sources import Sources, sources_of
 from casysid.identification.time_base import TimeBase
+from casysid.identification.torque_gains import TorqueGains
 from casysid.inertia import smallest_eigenvalue
 from casysid.moments import Moments
 from casysid.projection import ProjectionResult
@@ -47,6 +48,7 @@ class IdentificationResult:
         cutoff: The low-pass and why.
         delay: How late the torque was; taken out of all motions here, fitted and held out alike.
         friction: What the data added to the friction that was asked for.
+        torque_gains: Of the joints relative to each other, and why.
         regressor: Of which ``parameters`` are the coefficients.
         moments: Of the fitted recordings.
         estimate: The unconstrained estimate.
@@ -72,6 +74,7 @@ class IdentificationResult:
     cutoff: CutoffChoice
     delay: DelayChoice
     friction: FrictionChoice
+    torque_gains: TorqueGains
     regressor: Regressor
     moments: Moments
     estimate: Estimate
@@ -175,6 +178,11 @@ class IdentificationResult:
             "samples": {"train": self.train.samples, "held_out": held_out.samples if held_out else 0},
             "seconds": round(sum(self.seconds.values()), 3),
             "time_base": dataclasses.asdict(self.time_base),
+            "torque_gains": {
+                "gains": dict(zip(by_joint, self.torque_gains.values.tolist(), strict=True)),
+                "std": dict(zip(by_joint, self.torque_gains.error.tolist(), strict=True)),
+                "reason": self.torque_gains.reason,
+            },
             "cutoff": {
                 "hz": self.cutoff.cutoff,
                 "motion_band_hz": self.cutoff.motion_band,

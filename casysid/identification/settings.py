@@ -32,6 +32,7 @@ class Settings:
         time_scale: Time stamps times this are seconds; None looks whether inertial torques contradict the clock.
         quasi_static: Torques hold no inertial part, gravity and friction explain them; None lets the data decide.
         input_noise: What is known of the noise of the measured motion; by default the positions' is found in the data.
+        torque_gains: Measured torque over true torque of every degree of freedom; None fits them if needed.
         blocks: Blocks of time by which moments are kept: the folds of cross-validation and the unit of standard errors.
         threads: Threads of the regressor's evaluation.
     """
@@ -48,6 +49,7 @@ class Settings:
     time_scale: float | None = None
     quasi_static: bool | None = None
     input_noise: NoiseLevels = field(default_factory=NoiseLevels)
+    torque_gains: tuple[float, ...] | None = None
     blocks: int = 20
     threads: int = 2
 

@@ -57,9 +57,8 @@ def _reasons(result: IdentificationResult) -> list[str]:
 
 
 def _remarks(result: IdentificationResult) -> list[str]:
-    remarks = (
-        [f"{result.time_base.reason[:1].upper()}{result.time_base.reason[1:]}."] if result.time_base.reason else []
-    )
+    found = (result.time_base.reason, result.torque_gains.reason)
+    remarks = [f"{reason[:1].upper()}{reason[1:]}." for reason in found if reason]
     if result.held_out is None:
         remarks.append("No recording was held out: the error is that of the fit, and flatters.")
     missing = result.structural.rank - result.excited.rank

@@ -35,7 +35,7 @@ def solve_task(task: Task, progress: Progress | None) -> ProjectionResult:
     began = time.perf_counter()
     estimate = objective_of(task.misfit, task.frame, USUAL_WEIGHT).minimum(task.frame)
     if task.cone.contains(estimate):
-        return _result(task, estimate, ProjectionStatus.UNCHANGED, Solver.NONE, None, math.nan, 0, began)
+        return _result(task, task.polished(estimate), ProjectionStatus.UNCHANGED, Solver.NONE, None, math.nan, 0, began)
     certificate = weigh_prior(task)
     local, iterations = _solve_locally(task, certificate, progress)
     scaled, status, solver = _choose(local, certificate)

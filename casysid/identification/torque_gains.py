@@ -1,0 +1,223 @@
+"""Torque scales of the joints relative to each other, where no body could have made the torques as they are logged.
+
+Torques computed from motor currents carry the errors of the motors' torque constants. Least squares does not mind: it
+scales every joint's parameters as it likes. Bodies that move several joints cannot be scaled joint by joint, so
+consistent parameters then miss torques that unconstrained ones explain. Where consistency costs that much, a gain for
+every joint, ``tau_j = g_j Y_j θ`` with a geometric mean of one, is fitted together with consistent parameters
+(Gauss-Newton on the gains, each step a convex projection with one more column a joint), and kept if it predicts blocks
+of time left out better. The common scale cannot be seen without a known mass (Gautier and Briot 2014).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from casysid.arrays import Array, frozen
+from casysid.dynamics import Parameter
+from casysid.estimation import Ridge
+from casysid.estimation.cross_validation import contiguous_folds
+from casysid.identification.settings import Settings
+from casysid.inertia import Consistency
+from casysid.moments import Moments, NormalEquations
+from casysid.projection import (
+    Knowledge,
+    LinearKnowledge,
+    ProjectionProblem,
+    build_projection,
+    constrained_least_squares,
+)
+
+COSTLY = 1.05
+"""Gains are looked for when consistency, or gains fixed at one, raise the torque's error by so much."""
+WORTHWHILE = 0.95
+"""And kept when they bring the error on time left out below this fraction."""
+USUAL, TOLL = 0.3, 0.01
+"""A gain that is off by so much (in its logarithm) must lower the residual energy by this share."""
+FOLDS, STEPS, LONGEST_STEP, SETTLED = 3, 8, 0.3, 3e-3
+PRIOR_BUDGET = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueGains:
+    """Measured torque over true torque of every joint, the geometric mean being one.
+
+    Attributes:
+        values: Shape (nv,); ones where nothing speaks for others.
+        error: Their standard errors from blocks of time, shape (nv,); zeros where none were fitted.
+        reason: In words; empty when there is nothing to say.
+    """
+
+    values: Array
+    error: Array
+    reason: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", frozen(self.values))
+        object.__setattr__(self, "error", frozen(self.error))
+
+    @property
+    def found(self) -> bool:
+        """Whether gains other than one were fitted."""
+        return bool((self.error > 0.0).any())
+
+
+def no_gains(dofs: int) -> TorqueGains:
+    """All ones."""
+    return TorqueGains(np.ones(dofs), np.zeros(dofs))
+
+
+def settle_torque_gains(moments: Moments, parameters: Sequence[Parameter], settings: Settings) -> TorqueGains:
+    """Gains that the data call for.
+
+    Args:
+        moments: Of the regressor's columns.
+        parameters: The regressor's columns.
+        settings: Consistency and knowledge; gains given there are taken as they are.
+    """
+    dofs = len(moments.joints)
+    if settings.torque_gains is not None:
+        return TorqueGains(np.array(settings.torque_gains), np.zeros(dofs), "given")
+    if settings.consistency is None or dofs < 2:
+        return no_gains(dofs)
+    fit = _GainFit(
+        moments.joints, tuple(parameters), settings.consistency, settings.knowledge, _weights(moments, parameters)
+    )
+    if not fit.is_suspicious(moments):
+        return no_gains(dofs)
+    gains, _ = fit.gains(moments)
+    without, with_gains, values = 0.0, 0.0, []
+    for held_out in contiguous_folds(moments.blocks, FOLDS):
+        training = moments.select_blocks(np.setdiff1d(np.arange(moments.blocks), held_out))
+        test = moments.select_blocks(held_out)
+        own, parameters_with = fit.gains(training, gains, steps=2)
+        without += fit.error(test, fit.consistent(training)) ** 2
+        with_gains += fit.error(scaled(test, own), parameters_with) ** 2
+        values.append(own)
+    gain = math.sqrt(with_gains / without)
+    if gain > WORTHWHILE:
+        return no_gains(dofs)
+    spread = (FOLDS - 1) / FOLDS * np.sum((np.array(values) - np.mean(values, axis=0)) ** 2, axis=0)
+    words = ", ".join(f"{dof} {value:.2f}" for dof, value in zip(moments.joints, gains, strict=True))
+    return TorqueGains(
+        gains,
+        np.sqrt(spread),
+        f"no bodies make these torques in the proportions logged; with gains of {words} (measured over true torque, "
+        f"geometric mean one) they do (held-out error x {gain:.2f}). Check the motors' torque constants",
+    )
+
+
+def scaled(moments: Moments, gains: Array) -> Moments:
+    """Moments of the regressor whose rows are multiplied by ``gains``, shape (joints,)."""
+    factor = np.ones((len(gains), moments.gram.shape[-1]))
+    factor[:, :-1] = gains[:, None]
+    both = factor[:, :, None] * factor[:, None, :]
+    noise = None if moments.noise is None else moments.noise * both
+    return Moments(moments.gram * both, moments.count, moments.columns, moments.joints, noise)
+
+
+@dataclass(frozen=True, eq=False)
+class _GainFit:
+    """Consistent least squares with and without gains, joints weighted by the noise of their torque."""
+
+    dofs: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    consistency: Consistency
+    knowledge: tuple[Knowledge, ...]
+    weights: Array
+
+    @property
+    def prior(self) -> Array:
+        """The model file's parameters."""
+        return np.array([parameter.prior for parameter in self.parameters])
+
+    def error(self, moments: Moments, parameters: Array) -> float:
+        """Root of the weighted residual energy."""
+        return math.sqrt(float(self.weights @ moments.residual_energy(parameters).sum(axis=0)))
+
+    def is_suspicious(self, moments: Moments) -> bool:
+        """Whether consistency, or equal gains without it, leave a good deal of the torque unexplained."""
+        free = Ridge(standard_errors=False).estimate(moments, self.prior).parameters
+        bent = _with_gain_columns(moments, free)
+        prior = np.append(self.prior, np.zeros(len(self.dofs)))
+        with_gains = Ridge(standard_errors=False).estimate(bent, prior).parameters
+        error = self.error(moments, free)
+        return (
+            self.error(bent, with_gains) < error / COSTLY
+            or self.error(moments, self.consistent(moments)) > COSTLY * error
+        )
+
+    def consistent(self, moments: Moments) -> Array:
+        """Consistent parameters of least weighted residual energy."""
+        return constrained_least_squares(self._bodies, moments.pooled(self.weights), self.prior).parameters
+
+    def gains(self, moments: Moments, start: Array | None = None, steps: int = STEPS) -> tuple[Array, Array]:
+        """Gains, from a start or ones, and the consistent parameters that go with them."""
+        g = np.ones(len(moments.joints)) if start is None else start
+        theta = self.consistent(scaled(moments, g))
+        cost = self._cost(moments, g, theta)
+        for _ in range(steps):
+            step = self._gauss_newton(moments, g, theta, cost)
+            shorter = g * np.exp(step - step.mean())
+            bent = self.consistent(scaled(moments, shorter))
+            better = self._cost(moments, shorter, bent)
+            if better < cost:
+                g, theta = shorter, bent
+            if not better < (1.0 - SETTLED) * cost:
+                break
+            cost = better
+        return g, theta
+
+    def _cost(self, moments: Moments, g: Array, theta: Array) -> float:
+        """Weighted residual energy, raised by what gains far from one have to pay."""
+        energy = self.error(scaled(moments, g), theta) ** 2
+        return energy * (1.0 + TOLL * float(np.sum((np.log(g) / USUAL) ** 2)))
+
+    def _gauss_newton(self, moments: Moments, g: Array, theta: Array, cost: float) -> Array:
+        """Change of ``log g`` from one convex problem in bodies and gains, clipped."""
+        dofs, p = len(g), len(self.parameters)
+        normal = _with_gain_columns(scaled(moments, g), theta).pooled(self.weights)
+        xx, xy, pull = normal.xx.copy(), normal.xy.copy(), TOLL * cost / USUAL**2
+        xx[p:, p:] += pull * np.eye(dofs)
+        xy[p:] -= pull * np.log(g)
+        found = constrained_least_squares(
+            self._with_gains, NormalEquations(xx, xy, normal.yy, normal.count), np.append(self.prior, np.zeros(dofs))
+        )
+        return np.clip(found.parameters[p:], -LONGEST_STEP, LONGEST_STEP)
+
+    @cached_property
+    def _bodies(self) -> ProjectionProblem:
+        return build_projection(
+            self.parameters, consistency=self.consistency, knowledge=self.knowledge, prior_budget=PRIOR_BUDGET
+        )
+
+    @cached_property
+    def _with_gains(self) -> ProjectionProblem:
+        columns = tuple(Parameter(f"{dof}.gain", dof, "gain", "", False, 0.0) for dof in self.dofs)
+        one = LinearKnowledge(coefficients={column.name: 1.0 for column in columns}, lower=0.0, upper=0.0, name="gains")
+        return build_projection(
+            (*self.parameters, *columns),
+            consistency=self.consistency,
+            knowledge=(*self.knowledge, one),
+            prior_budget=PRIOR_BUDGET,
+        )
+
+
+def _weights(moments: Moments, parameters: Sequence[Parameter]) -> Array:
+    prior = np.array([parameter.prior for parameter in parameters])
+    return np.asarray(Ridge(standard_errors=False).estimate(moments, prior).noise_std ** -2.0)
+
+
+def _with_gain_columns(moments: Moments, parameters: Array) -> Moments:
+    """Moments with one more column a joint, its torque predicted by ``parameters``, in that joint's rows."""
+    dofs, p = len(moments.joints), len(moments.columns)
+    T = np.zeros((dofs, p + 1, p + dofs + 1))
+    T[:, :p, :p], T[:, p, -1] = np.eye(p), 1.0
+    T[np.arange(dofs), :p, p + np.arange(dofs)] = parameters
+    gram = np.swapaxes(T, 1, 2) @ moments.gram @ T
+    names = (*moments.columns, *(f"{dof}.gain" for dof in moments.joints))
+    return Moments(gram, moments.count, names, moments.joints)
