@@ -17,6 +17,7 @@ from casysid.dynamics import symbolic
 from casysid.dynamics.bulk import Bulk
 from casysid.dynamics.drive import ColumnMaker, Parameter, drive_columns
 from casysid.dynamics.friction import DEFAULT_FRICTION, Coupling, Direction, FrictionColumn
+from casysid.dynamics.joints import constant
 from casysid.errors import ParameterError
 from casysid.robot import Robot
 
