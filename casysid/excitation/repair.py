@@ -10,6 +10,8 @@ from casysid.excitation.verification import Verification, verify
 
 SHRINKING = 1.2
 """A motion beyond its limits is made smaller by so many times the share by which it is, until it passes the check."""
+BETWEEN = 2e-4
+"""Share of its scale that every quantity keeps to its bound at the instants of the check, for what happens between."""
 
 
 def shrunk(problem: ExcitationProblem, x: Array, least: float = 0.5) -> tuple[Array, float] | None:
@@ -25,9 +27,10 @@ def shrunk(problem: ExcitationProblem, x: Array, least: float = 0.5) -> tuple[Ar
     while factor >= least:
         smaller = (anchor + factor * (values - anchor)).ravel()
         checked = verify(problem, problem.trajectory(smaller))
-        if checked.passed:
+        room = min((one.share for one in checked.margins), default=np.inf) - BETWEEN
+        if room >= 0.0:
             return smaller, factor
-        factor *= 1.0 - min(SHRINKING * -checked.violations[0].share + 5e-4, 0.2)
+        factor *= 1.0 - min(SHRINKING * -room + 5e-4, 0.2)
     return None
 
 
