@@ -77,7 +77,7 @@ class DenoisingEstimator(ABC):
         problem = standardise(_pool_joints(moments, noise_std), theta0)
         if problem.is_degenerate:
             return dataclasses.replace(problem.degenerate_estimate(self.name), noise_std=noise_std)
-        first = fit = self._fit(problem, self._columns(problem), None)
+        first = fit = self._fit(problem, self._columns(problem, len(moments.joints)), None)
         for _ in range(self.reweightings if len(noise_std) > 1 else 0):
             update = fit.residual_std(moments)
             if np.abs(np.log(update / noise_std)).max() <= SETTLED:
@@ -86,10 +86,13 @@ class DenoisingEstimator(ABC):
             fit = self._fit(standardise(_pool_joints(moments, noise_std), theta0), fit.chosen, fit)
         return self._to_estimate(fit, first.posterior.start_bounds, noise_std)
 
-    def _columns(self, problem: StandardisedProblem) -> npt.NDArray[np.intp]:
-        """Without those that are mixtures of others; all, where there are too few rows to tell."""
+    def _columns(self, problem: StandardisedProblem, joints: int) -> npt.NDArray[np.intp]:
+        """Without those that are mixtures of others; all, where there are too few rows to tell.
+
+        Columns that depend on each other in the rows of several joints do so by the mechanism, and are no mixtures.
+        """
         d = len(problem.live)
-        return find_parts(problem.normal.xx) if problem.normal.count > d else np.arange(d)
+        return find_parts(problem.normal.xx) if joints == 1 and problem.normal.count > d else np.arange(d)
 
     def _fit(
         self, whole: StandardisedProblem, chosen: npt.NDArray[np.intp], before: DenoisingFit | None
