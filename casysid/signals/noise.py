@@ -7,7 +7,6 @@ from scipy.signal import periodogram
 
 from casysid.arrays import Array
 
-FLOOR_MARGIN = 4.0
 MINIMUM_GAPS = 10
 MULTIPLES_THAT_TELL = 9.0
 SPLINE_ORDER = 3
@@ -30,13 +29,14 @@ def _even_samples(time: Array, position: Array) -> tuple[Array, float]:
 def motion_band(time: Array, position: Array, share: float = 0.99) -> Array:
     """Frequency below which ``share`` of each channel's velocity energy lies [Hz], shape (n,), sensor noise left out.
 
-    The noise floor is the median of the position spectrum over its upper half; only lines four times above it count as
-    motion. A channel that never rises above its floor has band 0.
+    The noise floor is the median of the position spectrum over its upper half; only lines above what the noise of so
+    many lines reaches by chance count as motion. A channel that never rises above its floor has band 0.
     """
     even, rate = _even_samples(time, position)
     frequency, power = periodogram(even, rate, window="hann", detrend="linear", axis=0)
     floor = np.median(power[len(power) // 2 :], axis=0) / np.log(2.0)
-    motion = np.where(power > FLOOR_MARGIN * floor, power, 0.0) * frequency[:, None] ** 2
+    seen = power > (np.log(len(power)) + CHANCE_LINES) * floor
+    motion = np.where(seen, power, 0.0) * frequency[:, None] ** 2
     moving = motion[: max(len(motion) // 2, 1)]
     total = np.cumsum(moving, axis=0)
     reached = np.argmax(total >= share * total[-1], axis=0)
