@@ -19,6 +19,7 @@ import numpy as np
 
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Parameter
+from casysid.errors import SolverError
 from casysid.estimation import Ridge
 from casysid.estimation.cross_validation import contiguous_folds
 from casysid.identification.settings import Settings
@@ -72,7 +73,7 @@ def no_gains(dofs: int) -> TorqueGains:
 
 
 def settle_torque_gains(moments: Moments, parameters: Sequence[Parameter], settings: Settings) -> TorqueGains:
-    """Gains that the data call for.
+    """Gains that the data call for; ones where the search for them finds no answer that can be stood by.
 
     Args:
         moments: Of the regressor's columns.
@@ -84,9 +85,22 @@ def settle_torque_gains(moments: Moments, parameters: Sequence[Parameter], setti
         return TorqueGains(np.array(settings.torque_gains), np.zeros(dofs), "given")
     if settings.consistency is None or dofs < 2:
         return no_gains(dofs)
-    fit = _GainFit(
-        moments.joints, tuple(parameters), settings.consistency, settings.knowledge, _weights(moments, parameters)
-    )
+    try:
+        return _search(moments, parameters, settings, settings.consistency)
+    except SolverError:
+        return no_gains(dofs)
+
+
+def _search(
+    moments: Moments, parameters: Sequence[Parameter], settings: Settings, consistency: Consistency
+) -> TorqueGains:
+    """Gains, if they are needed and predict better.
+
+    Raises:
+        SolverError: No consistent parameters were found on the way.
+    """
+    dofs = len(moments.joints)
+    fit = _GainFit(moments.joints, tuple(parameters), consistency, settings.knowledge, _weights(moments, parameters))
     if not fit.is_suspicious(moments):
         return no_gains(dofs)
     gains, _ = fit.gains(moments)
