@@ -339,7 +339,7 @@ METHODS: dict[str, Method] = {
     "ridge (hand-tuned)": hand_tuned_ridge,
     "LASSO": of_paper(LassoRegression()),
     "stepwise": of_paper(StepwiseRegression()),
-    "Bayesian de-noising, encoder noise": of_paper(ErrorsInVariables(BayesianDenoising())),
+    "Bayesian de-noising, encoder noise": of_paper(ErrorsInVariables(BayesianDenoising(vector="noisy"))),
     "errors in variables": of_paper(ErrorsInVariables()),
     "weighted least squares, own filter": of_casysid(WeightedLeastSquares()),
     "errors in variables, own filter": of_casysid(ErrorsInVariables()),
