@@ -10,6 +10,7 @@ from casysid.estimation import Status
 from casysid.identification.result import IdentificationResult
 
 WORTH_NAMING = 6
+FAR_OFF = 3.0
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,11 @@ def _remarks(result: IdentificationResult) -> list[str]:
     ]
     if still:
         remarks.append(f"Never moved: {_names(still)}. Its friction and much of its inertia cannot be identified.")
+    if unseen := _far_off_unseen(result):
+        remarks.append(
+            f"Mass that the data cannot see and that is far from the file's: {_names(unseen)}. Only combinations with "
+            "other links are reliable; weigh a link or the robot and give it as knowledge."
+        )
     if result.held_out is not None:
         poor = [
             dof for dof, error in zip(result.robot.dofs, result.held_out.relative_by_joint, strict=True) if error > 1.0
@@ -85,6 +91,16 @@ def _remarks(result: IdentificationResult) -> list[str]:
         if poor:
             remarks.append(f"Torque not explained at all on held-out data: {_names(poor)}.")
     return remarks
+
+
+def _far_off_unseen(result: IdentificationResult) -> list[str]:
+    """Links whose mass no torque tells by itself, and is several times or a fraction of the file's."""
+    file = result.robot.inertial_parameters.reshape(-1, 10)[:, 0]
+    return [
+        f"{link.name} {link.mass:.3g} kg (file {mass:.3g} kg)"
+        for link, mass in zip(result.links(), file, strict=True)
+        if np.isinf(link.mass_std) and mass > 0.0 and not 1.0 / FAR_OFF < link.mass / mass < FAR_OFF
+    ]
 
 
 def _names(names: tuple[str, ...] | list[str]) -> str:

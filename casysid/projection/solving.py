@@ -26,6 +26,8 @@ LIFT = 1e-2
 """Starts lie this far inside: on the boundary the virtual parameters have stationary points that are no optimum."""
 ROUNDING = 1e-7
 """Violations of constraints below this are rounding."""
+AS_GOOD_AS_ZERO = 1e-9
+"""Single numbers below this, in the frame's units, are a solver's idea of zero."""
 AT_BOUND = 2e-3
 """What lies closer to its bound than this, in the frame's units, is on it."""
 
@@ -108,6 +110,8 @@ def _result(
     iterations: int,
     began: float,
 ) -> ProjectionResult:
+    scaled, single = scaled.copy(), list(task.problem.layout.non_negative)
+    scaled[single] = np.where(scaled[single] > AS_GOOD_AS_ZERO, scaled[single], 0.0)
     parameters = task.frame.transform @ scaled
     bodies = parameters[: task.problem.layout.inertial].reshape(-1, 10)
     return ProjectionResult(

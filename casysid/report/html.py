@@ -100,7 +100,8 @@ def _sections(result: IdentificationResult) -> list[Section]:
             "What decided the links' parameters",
             "The mechanism lets a parameter be known by itself, only in combination with others, or not at all; the "
             "recordings excite it when they show most of what the mechanism lets anyone know. The last column is the "
-            "share that the data decided: the rest is the model file's.",
+            "share that the data decided: the rest is the model file's. What no torque depends on follows the rest of "
+            "its body, as far as bodies like the file's hang together.",
             table=source_table(result),
             lines_title=f"{len(result.sources.of_the_file)} parameters are the model file's rather than the data's",
             lines=(", ".join(result.sources.of_the_file),),

@@ -25,6 +25,10 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
+MICROMETRES = 6
+"""Decimals of a length in metres that mean anything."""
+
+
 def number(value: float | None, digits: int = 4) -> str:
     """A number as people write it; a dash for what is not there or not known."""
     if value is None or math.isnan(value):
@@ -82,7 +86,7 @@ def link_table(result: IdentificationResult) -> Table:
     """Mass and centre of mass with standard errors, principal figures of the inertia, and what can be known."""
     rows = []
     for link in result.links():
-        centre = ", ".join(number(float(value), 3) for value in link.center_of_mass)
+        centre = ", ".join(number(round(float(value), MICROMETRES) + 0.0, 3) for value in link.center_of_mass)
         diagonal = ", ".join(number(float(value), 3) for value in link.inertia[:3])
         rows.append(
             (link.name, number(link.mass), number(link.mass_std, 2), centre, diagonal, link.identifiable[0].value)
