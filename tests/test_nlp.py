@@ -118,6 +118,15 @@ def test_an_error_in_progress_is_raised():
         solve_nlp(rosenbrock(), np.full(5, -1.0), parameters=[1.0], progress=broken)
 
 
+@pytest.fixture
+def heard_interrupts():
+    """Ctrl-C raises, also where the tests were started in the background of a shell, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heard_interrupts")
 def test_ctrl_c_stops_within_one_iteration_and_is_raised():
     program, steps = rosenbrock(), []
 
