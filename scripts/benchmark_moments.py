@@ -12,6 +12,7 @@ moments.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import math
 import resource
@@ -72,7 +73,7 @@ def loop_moments(robot: Robot, q: Array, v: Array, a: Array, tau: Array) -> Arra
 def routes(robot: Robot, samples: int) -> dict[str, tuple[int, Callable[[], object]]]:
     """What is compared: samples and a run of each route."""
     log = random_log(robot, samples)
-    replayed, compiled = build_regressor(robot), build_regressor(robot)
+    replayed, compiled = build_regressor(robot), build_regressor(dataclasses.replace(robot))  # nothing shared
     found = bulk.FIND_FROM, bulk.COMPILE_FROM
     bulk.FIND_FROM = bulk.COMPILE_FROM = math.inf  # type: ignore[assignment]
     _ = replayed.equations  # made while compiling is out of reach

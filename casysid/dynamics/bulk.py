@@ -11,7 +11,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from queue import SimpleQueue
+from contextlib import contextmanager
 from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
@@ -25,6 +25,8 @@ FIND_FROM = 10_000  # samples: evaluating fewer takes no longer than looking for
 COMPILE_FROM = 100_000  # samples: replaying more takes longer than compiling
 MOST_NUMBERS = 2**23  # in the memory of one thread: shorter chunks for very large robots
 
+KEPT = 4  # engines of one function that wait for more samples
+
 Result = TypeVar("Result")
 Indices = npt.NDArray[np.intp]
 
@@ -34,6 +36,7 @@ class Engine(Protocol):
 
     inputs: Array  # (scalars, samples)
     outputs: Array  # (nonzeros, samples)
+    samples: int  # asked for
 
     def run(self) -> None:
         """Fill the outputs."""
@@ -44,29 +47,32 @@ class Bulk:
 
     Attributes:
         function: The ``casadi.Function``.
+        constants: Its last inputs, where they are the same at all samples and settled.
     """
 
-    def __init__(self, function: Any) -> None:
-        """Nothing is compiled yet."""
+    def __init__(self, function: Any, constants: Sequence[Array] = (), engines: Engines | None = None) -> None:
+        """Nothing is compiled yet, unless the engines of the same function with other constants are given."""
         self.function = function
-        self._kernel: compiled.Kernel | None = None
-        self._seen = 0
-        self._untried = [(FIND_FROM, compiled.find_kernel), (COMPILE_FROM, compiled.compile_kernel)]
-        self._lock = threading.Lock()
+        self.constants = tuple(constants)
+        self._engines = engines or Engines(function)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Bulk, (self.function,)
+        return Bulk, (self.function, self.constants)
+
+    def given(self, *constants: Array) -> Bulk:
+        """The same function with its last inputs settled; its code is shared."""
+        return Bulk(self.function, constants, self._engines)
 
     @property
     def route(self) -> Literal["replay", "compiled"]:
         """How the last samples were evaluated."""
-        return "replay" if self._kernel is None else "compiled"
+        return "replay" if self._engines.kernel is None else "compiled"
 
     def evaluate(self, *inputs: npt.ArrayLike, threads: int = 2) -> Array:
         """Structural nonzeros of the output at every sample, shape (N, nonzeros), in CasADi's column-major order.
 
         Args:
-            inputs: One for each input of the function: (N, n), or (n,) when it is the same at all samples.
+            inputs: One for each input that is not settled: (N, n), or (n,) when it is the same at all samples.
             threads: How many to use.
 
         Raises:
@@ -100,21 +106,14 @@ class Bulk:
         Yields:
             Number of the group, and the result of ``consume``.
         """
-        kernel = self._choose_route(inputs, sum(len(group) for group in groups))
-        rows = self.function.nnz_out(0) + self.function.sz_w()
-        longest = replay.SAMPLES if kernel is None else compiled.SAMPLES
-        pieces = _split(groups, min(longest, max(MOST_NUMBERS // rows, 64)))
+        inputs = [*inputs, *self.constants]
+        self._engines.choose_route(inputs, sum(len(group) for group in groups))
+        pieces = _split(groups, self._engines.longest_piece)
         threads = max(min(threads, len(pieces)), 1)
-        engines: SimpleQueue[Engine] = SimpleQueue()
-        for _ in range(threads):
-            engines.put(self._engine(kernel, max((len(piece) for _, piece in pieces), default=0)))
 
         def work(piece: Indices) -> Result:
-            engine = engines.get()
-            try:
+            with self._engines.lent(len(piece)) as engine:
                 return consume(_run(engine, inputs, piece), piece)
-            finally:
-                engines.put(engine)
 
         with ThreadPoolExecutor(threads) as pool:
             pending: deque[tuple[int, Future[Result]]] = deque()
@@ -133,7 +132,7 @@ class Bulk:
         """
         function = self.function
         arrays = [np.asarray(values, dtype=np.float64) for values in inputs]
-        sizes = [function.nnz_in(i) for i in range(function.n_in())]
+        sizes = [function.nnz_in(i) for i in range(function.n_in() - len(self.constants))]
         lengths = {len(array) for array in arrays if array.ndim == 2}
         if (
             len(lengths) > 1
@@ -144,29 +143,74 @@ class Bulk:
             raise ParameterError(f"{function.name()}: wants {wanted}; got {', '.join(str(x.shape) for x in arrays)}")
         return arrays, lengths.pop() if lengths else 1
 
-    def _choose_route(self, inputs: Sequence[Array], samples: int) -> compiled.Kernel | None:
-        """The kernel, if there is one: looked for, or compiled, once so many samples have come that it pays."""
+
+class Engines:
+    """The engines of one function, made when they are wanted and kept for the next samples; threads may share them.
+
+    Attributes:
+        function: The ``casadi.Function``.
+        kernel: What was compiled of it; None when it is replayed.
+    """
+
+    def __init__(self, function: Any) -> None:
+        """Nothing is compiled yet."""
+        self.function = function
+        self.kernel: compiled.Kernel | None = None
+        self._seen = 0
+        self._untried = [(FIND_FROM, compiled.find_kernel), (COMPILE_FROM, compiled.compile_kernel)]
+        self._idle: deque[Engine] = deque(maxlen=KEPT)
+        self._lock = threading.Lock()
+
+    @property
+    def longest_piece(self) -> int:
+        """How many samples are evaluated at once."""
+        longest = replay.SAMPLES if self.kernel is None else compiled.SAMPLES
+        rows = int(self.function.nnz_out(0) + self.function.sz_w())
+        return min(longest, max(MOST_NUMBERS // rows, 64))
+
+    @contextmanager
+    def lent(self, samples: int) -> Iterator[Engine]:
+        """An engine for so many samples, for this thread alone as long as the context lasts."""
+        room, kernel = _rounded(samples), self.kernel
+        with self._lock:
+            fitting = [engine for engine in self._idle if engine.samples == room]
+            if fitting:
+                self._idle.remove(fitting[-1])
+        engine = fitting[-1] if fitting else self._make(kernel, room)
+        yield engine
+        with self._lock:
+            if kernel is self.kernel:
+                self._idle.append(engine)
+
+    def choose_route(self, inputs: Sequence[Array], samples: int) -> None:
+        """Look for a kernel, or compile one, once so many samples have come that it pays."""
         with self._lock:
             self._seen += samples
             if self.function.n_instructions() > compiled.LONGEST:
-                return None
-            while self._kernel is None and self._untried and self._seen >= self._untried[0][0]:
+                return
+            while self.kernel is None and self._untried and self._seen >= self._untried[0][0]:
                 kernel = self._untried.pop(0)[1](self.function)
                 if kernel is not None and self._agrees(kernel, inputs):
-                    self._kernel = kernel
-            return self._kernel
+                    self.kernel = kernel
+                    self._idle.clear()
 
     def _agrees(self, kernel: compiled.Kernel, inputs: Sequence[Array]) -> bool:
         """Whether a kernel gives what the replay gives at the first samples: no compiler's fault may pass for data."""
         first = np.arange(min((len(x) for x in inputs if x.ndim == 2), default=1))[:8]
-        got, wanted = (_run(self._engine(k, len(first)), inputs, first) for k in (kernel, None))
+        got, wanted = (_run(self._make(k, len(first)), inputs, first) for k in (kernel, None))
         scale = float(np.abs(wanted).max(initial=0.0))
         return np.allclose(got, wanted, rtol=1e-9, atol=1e-9 * scale, equal_nan=True)
 
-    def _engine(self, kernel: compiled.Kernel | None, samples: int) -> Engine:
+    def _make(self, kernel: compiled.Kernel | None, samples: int) -> Engine:
         if kernel is None:
             return replay.Replay(self.function, samples)
         return compiled.Compiled(self.function, kernel, samples)
+
+
+def _rounded(samples: int) -> int:
+    """The next of few numbers, no more than an eighth above beyond sixty-four, so that engines fit again."""
+    step = max(1 << max(samples.bit_length() - 4, 0), 8)
+    return -(-samples // step) * step
 
 
 def _split(groups: Sequence[Indices], longest: int) -> list[tuple[int, Indices]]:

@@ -64,10 +64,12 @@ class Compiled:
     Attributes:
         inputs: To be filled, shape (scalars, samples): all inputs one after the other.
         outputs: Filled by :meth:`run`, shape (nonzeros, samples).
+        samples: How many it was made for.
     """
 
     def __init__(self, function: Any, kernel: Kernel, samples: int) -> None:
         """Memory for so many samples (rounded up to whole vectors) of a function and its kernel."""
+        self.samples = samples
         whole = -(-samples // _MOST_LANES) * _MOST_LANES
         self.inputs = np.zeros((count_inputs(function), whole))
         self.outputs = np.zeros((function.nnz_out(0), whole))

@@ -9,7 +9,14 @@ from typing import Any
 import casadi as ca
 
 from casysid.dynamics import symbolic
-from casysid.dynamics.friction import Coupling, Direction, FrictionColumn, coupling_direction, joint_directions
+from casysid.dynamics.friction import (
+    Coupling,
+    Direction,
+    FrictionColumn,
+    SmoothSign,
+    coupling_direction,
+    joint_directions,
+)
 from casysid.dynamics.friction_kinds import LoadedCoulomb
 from casysid.dynamics.joints import constant
 from casysid.errors import ParameterError
@@ -38,10 +45,11 @@ class Parameter:
 
 
 def drive_columns(
-    robot: Robot, state: symbolic.State, friction: Sequence[FrictionColumn], couplings: Sequence[Coupling]
+    column_along: ColumnMaker, friction: Sequence[FrictionColumn], couplings: Sequence[Coupling]
 ) -> Iterator[tuple[Parameter, Any]]:
     """Every friction column with its parameter: kind by kind for the joints, then coupling by coupling."""
-    column_along, joints = ColumnMaker(robot, state), joint_directions(robot)
+    robot, state = column_along.robot, column_along.state
+    joints = joint_directions(robot)
     ordinary = [
         column_along(column, direction, column.prior(robot, dof))
         for column in friction
@@ -59,16 +67,25 @@ def drive_columns(
 
 
 class ColumnMaker:
-    """Makes columns of friction along directions, on one state's symbols."""
+    """Makes columns of friction along directions, on one state's symbols.
+
+    Attributes:
+        robot: Whose columns.
+        state: Its symbols.
+        signs: Kind and direction of every smooth sign made so far, with the symbol that stands for its width.
+    """
 
     def __init__(self, robot: Robot, state: symbolic.State) -> None:
-        self._robot, self._state = robot, state
+        self.robot, self.state = robot, state
+        self.signs: list[tuple[str, Direction, Any]] = []
         self._positions, self._missing = _positions(robot, state)
         self._loads: dict[tuple[float, ...] | None, Any] = {}
 
     def __call__(self, column: FrictionColumn, direction: Direction, prior: float) -> tuple[Parameter, Any] | None:
         """The column's parameter and its torque (nv,); None where it does not act."""
-        weights, state = constant(direction.weights), self._state
+        weights, state = constant(direction.weights), self.state
+        if isinstance(column, SmoothSign):
+            direction = replace(direction, width=ca.SX.sym("width"))
         if isinstance(column, LoadedCoulomb):
             direction = replace(direction, load=weights.T @ self._load(column))
         s, ds, dds = (weights.T @ x for x in (self._positions, state.v, state.a))
@@ -80,6 +97,8 @@ class ColumnMaker:
             raise ParameterError(
                 f"friction: '{column.kind}' uses the position of '{direction.name}', which has none; return None there"
             )
+        if direction.width is not None:
+            self.signs.append((column.kind, replace(direction, width=None, load=None), direction.width))
         name, unit = f"{direction.name}.{column.kind}", column.unit(direction)
         parameter = Parameter(name, direction.name, column.kind, unit, column.non_negative, prior)
         return parameter, weights @ torque
@@ -88,10 +107,10 @@ class ColumnMaker:
         """Torques (nv,) that hold the column's model still."""
         key = column.inertial_parameters
         if key not in self._loads:
-            still = symbolic.State(self._state.q, ca.SX(self._robot.nv, 1), ca.SX(self._robot.nv, 1))
-            parameters = constant(column.model(self._robot.inertial_parameters))
+            still = symbolic.State(self.state.q, ca.SX(self.robot.nv, 1), ca.SX(self.robot.nv, 1))
+            parameters = constant(column.model(self.robot.inertial_parameters))
             self._loads[key] = symbolic.inverse_dynamics(
-                self._robot, symbolic.link_motions(self._robot, still), parameters
+                self.robot, symbolic.link_motions(self.robot, still), parameters
             )
         return self._loads[key]
 

@@ -30,12 +30,14 @@ class Direction:
         weights: ``c``, shape (nv,).
         linear: Whether it is a length [m] rather than an angle [rad].
         load: What gravity asks along it by a model, symbolic, [N m] or [N]; None for columns that do not want it.
+        width: Of a column's smooth sign along it, symbolic; None for the column's own number.
     """
 
     name: str
     weights: Array
     linear: bool
     load: Any = None
+    width: Any = None
 
 
 @dataclass(frozen=True)
@@ -124,6 +126,8 @@ class Viscous(FrictionColumn):
 class SmoothSign(FrictionColumn):
     """A column that changes with the sign of velocity, made smooth: ``tanh(velocity / width)``.
 
+    A column of one's own takes its width from :meth:`width_along`, which may be a symbol, never from ``width`` itself.
+
     Attributes:
         width: Velocity [rad/s or m/s] at which 76 % of the friction acts: one for all, one for each of the nv degrees
             of freedom, or by name of the direction.
@@ -144,7 +148,11 @@ class SmoothSign(FrictionColumn):
         """``tanh(ds/dt / width)``."""
         return ca.tanh(velocity / self.width_along(direction))
 
-    def width_along(self, direction: Direction) -> float:
+    def width_along(self, direction: Direction) -> Any:
+        """The width as it enters the torque: the direction's symbol, else :meth:`width_at`."""
+        return self.width_at(direction) if direction.width is None else direction.width
+
+    def width_at(self, direction: Direction) -> float:
         """The width at a direction; at a coupling the weighted sum of its joints' unless it is named itself.
 
         Raises:

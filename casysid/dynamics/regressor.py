@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -15,17 +15,12 @@ import numpy.typing as npt
 from casysid.arrays import Array, frozen
 from casysid.dynamics import symbolic
 from casysid.dynamics.bulk import Bulk
-from casysid.dynamics.drive import ColumnMaker, Parameter, drive_columns
-from casysid.dynamics.friction import DEFAULT_FRICTION, Coupling, Direction, FrictionColumn
+from casysid.dynamics.drive import ColumnMaker, Parameter
+from casysid.dynamics.friction import DEFAULT_FRICTION, Coupling, Direction, FrictionColumn, SmoothSign
 from casysid.dynamics.joints import constant
+from casysid.dynamics.template import Template, build_template, finish_template
 from casysid.errors import ParameterError
 from casysid.robot import Robot
-
-_INERTIAL = {
-    "m": "kg", "mcx": "kg m", "mcy": "kg m", "mcz": "kg m",
-    "Ixx": "kg m^2", "Ixy": "kg m^2", "Iyy": "kg m^2", "Ixz": "kg m^2", "Iyz": "kg m^2", "Izz": "kg m^2",
-}  # fmt: skip
-_POSITIVE = {"m", "Ixx", "Iyy", "Izz"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -33,20 +28,26 @@ class Regressor:
     """``tau = Y(q, v, a) θ``, for one robot with its friction.
 
     Attributes:
-        robot: Whose torques these are.
-        parameters: What the p columns multiply: ten for each link, then friction kind by kind, then couplings.
-        function: ``casadi.Function`` ``(q, v, a) -> Y``, sparse, shape (nv, p).
-        torque: ``casadi.Function`` ``(q, v, a, parameters) -> tau``, which is ``Y θ`` in fewer operations.
+        template: What this regressor is with its smooth signs' widths left open.
+        widths: Of the smooth signs, in the order of ``template.signs``.
         friction: Kinds of friction in it.
         couplings: Transmissions in it.
     """
 
-    robot: Robot
-    parameters: tuple[Parameter, ...]
-    function: Any
-    torque: Any
+    template: Template
+    widths: Array
     friction: tuple[FrictionColumn, ...] = ()
     couplings: tuple[Coupling, ...] = ()
+
+    @property
+    def robot(self) -> Robot:
+        """Whose torques these are."""
+        return self.template.robot
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """What the p columns multiply: ten for each link, then friction kind by kind, then couplings."""
+        return self.template.parameters
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -58,28 +59,34 @@ class Regressor:
         """The model file's parameters, shape (p,)."""
         return frozen([parameter.prior for parameter in self.parameters])
 
-    @cached_property
+    @property
     def row_columns(self) -> tuple[npt.NDArray[np.intp], ...]:
         """For each degree of freedom, the columns that are structurally nonzero in its row of ``Y``."""
-        rows, columns = (np.array(index, dtype=np.intp) for index in self.function.sparsity_out(0).get_triplet())
-        return tuple(np.sort(columns[rows == dof]) for dof in range(self.robot.nv))
+        return self.template.row_columns
 
     @cached_property
+    def function(self) -> Any:
+        """``casadi.Function`` ``(q, v, a) -> Y``, sparse, shape (nv, p)."""
+        state = symbolic.State.of(self.robot)
+        inputs = [state.q, state.v, state.a]
+        Y = self.template.function(*inputs, constant(self.widths))
+        return ca.Function("regressor", inputs, [Y], ["q", "v", "a"], ["Y"], {"cse": True})
+
+    @cached_property
+    def torque(self) -> Any:
+        """``casadi.Function`` ``(q, v, a, parameters) -> tau``, which is ``Y θ`` in fewer operations."""
+        state, theta = symbolic.State.of(self.robot), ca.SX.sym("parameters", len(self.parameters))
+        inputs = [state.q, state.v, state.a, theta]
+        tau = self.template.torque(*inputs, constant(self.widths))
+        return ca.Function("torque", inputs, [tau], ["q", "v", "a", "parameters"], ["tau"], {"cse": True})
+
+    @property
     def equations(self) -> Bulk:
         """Bulk evaluation of ``(q, v, a, tau)`` -> for each degree of freedom its row's nonzeros, then its torque.
 
         The entries of row ``i`` belong to the columns ``row_columns[i]``.
         """
-        state, tau = symbolic.State.of(self.robot), ca.SX.sym("tau", self.robot.nv)
-        Y = self.function(state.q, state.v, state.a)
-        entries = [
-            entry
-            for dof, columns in enumerate(self.row_columns)
-            for entry in (*(Y[dof, int(column)] for column in columns), tau[dof])
-        ]
-        inputs = [state.q, state.v, state.a, tau]
-        names = ["q", "v", "a", "tau"]
-        return Bulk(ca.Function("equations", inputs, [ca.vertcat(*entries)], names, ["rows"], {"cse": True}))
+        return self.template.equations.given(self.widths)
 
     def evaluate(self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike) -> Array:
         """``Y`` at every sample, dense, shape (N, nv, p): 8 N nv p bytes.
@@ -117,11 +124,7 @@ class Regressor:
         Raises:
             ParameterError: When a shape does not fit.
         """
-        return self._torques.evaluate(q, v, a, parameters)
-
-    @cached_property
-    def _torques(self) -> Bulk:
-        return Bulk(self.torque)
+        return self.template.torques.given(self.widths).evaluate(q, v, a, parameters)
 
 
 def build_regressor(
@@ -155,20 +158,10 @@ def build_regressor(
     kinds, coupled = [column.kind for column in friction], [coupling.name for coupling in couplings]
     if len(set(kinds)) != len(kinds) or len(set(coupled)) != len(coupled):
         raise ParameterError(f"friction: every kind and every coupling once; got {kinds} and {coupled}")
-    state = symbolic.State.of(robot)
-    still = ca.SX(robot.nv, 1)
-    motions = symbolic.link_motions(robot, symbolic.State(state.q, still, still) if quasi_static else state)
-    driven = symbolic.State(state.q, state.v, still) if quasi_static else state
-    drive = list(drive_columns(robot, driven, friction, couplings))
-    drive_matrix = ca.horzcat(ca.SX(robot.nv, 0), *(column for _, column in drive))
-    parameters = (*_inertial_parameters(robot), *(parameter for parameter, _ in drive))
-    rigid = robot.inertial_parameters.size
-    theta = ca.SX.sym("parameters", len(parameters))
-    measured = ca.diag(constant(gains))
-    Y = measured @ ca.horzcat(symbolic.regressor(robot, motions), drive_matrix)
-    tau = measured @ (symbolic.inverse_dynamics(robot, motions, theta[:rigid]) + drive_matrix @ theta[rigid:])
-    built = _regressor(robot, state, parameters, Y, theta, tau)
-    return replace(built, friction=tuple(friction), couplings=tuple(couplings))
+    template = build_template(robot, friction, couplings, quasi_static, gains.tolist())
+    return Regressor(
+        template=template, widths=template.widths(friction), friction=tuple(friction), couplings=tuple(couplings)
+    )
 
 
 def extend_regressor(regressor: Regressor, columns: Sequence[tuple[FrictionColumn, Direction]]) -> Regressor:
@@ -194,25 +187,6 @@ def extend_regressor(regressor: Regressor, columns: Sequence[tuple[FrictionColum
     theta, p = ca.SX.sym("parameters", len(parameters)), len(regressor.parameters)
     inputs = (state.q, state.v, state.a)
     Y, tau = ca.horzcat(regressor.function(*inputs), matrix), regressor.torque(*inputs, theta[:p]) + matrix @ theta[p:]
-    return _regressor(robot, state, parameters, Y, theta, tau)
-
-
-def _regressor(
-    robot: Robot, state: symbolic.State, parameters: tuple[Parameter, ...], Y: Any, theta: Any, tau: Any
-) -> Regressor:
-    inputs, names = [state.q, state.v, state.a], ["q", "v", "a"]
-    return Regressor(
-        robot=robot,
-        parameters=parameters,
-        function=ca.Function("regressor", inputs, [ca.sparsify(Y)], names, ["Y"], {"cse": True}),
-        torque=ca.Function(
-            "torque", [*inputs, theta], [ca.densify(tau)], [*names, "parameters"], ["tau"], {"cse": True}
-        ),
-    )
-
-
-def _inertial_parameters(robot: Robot) -> Iterator[Parameter]:
-    values = robot.inertial_parameters.reshape(-1, len(_INERTIAL))
-    for link, priors in zip(robot.links, values, strict=True):
-        for (kind, unit), prior in zip(_INERTIAL.items(), priors, strict=True):
-            yield Parameter(f"{link}.{kind}", link, kind, unit, kind in _POSITIVE, float(prior))
+    template = finish_template(robot, state, parameters, Y, theta, tau, column_along.signs)
+    smooth = [(column, direction) for column, direction in columns if isinstance(column, SmoothSign)]
+    return Regressor(template=template, widths=frozen([column.width_at(direction) for column, direction in smooth]))

@@ -19,10 +19,12 @@ class Replay:
     Attributes:
         inputs: To be filled, shape (scalars, samples): all inputs one after the other.
         outputs: Filled by :meth:`run`, shape (nonzeros, samples).
+        samples: How many it was made for.
     """
 
     def __init__(self, function: Any, samples: int) -> None:
         """Bind the operations of an SX function with one output to memory for so many samples."""
+        self.samples = samples
         self.inputs = np.zeros((count_inputs(function), samples))
         self.outputs = np.zeros((function.nnz_out(0), samples))
         self._scratch = np.zeros((function.sz_w(), samples))

@@ -15,7 +15,7 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.dynamics import Coulomb
 from casysid.estimation import Ridge, cross_validated_energy
-from casysid.identification.problem import USUAL_WIDTH, Mask, build_problem
+from casysid.identification.problem import USUAL_WIDTH, Mask, make_motions, regressor_for, sum_moments
 from casysid.identification.settings import Settings
 from casysid.recording import Recording
 from casysid.robot import Robot
@@ -47,12 +47,12 @@ def choose_relative_width(
     """
     if settings.coulomb_width is not None or not any(isinstance(column, Coulomb) for column in settings.friction):
         return np.full(robot.nv, USUAL_WIDTH)
+    motions = make_motions(robot, recordings, cutoff, settings, moving_only=moving_only, quick=True)
     energy = []
     for k, width in enumerate(RELATIVE_WIDTHS):
-        problem = build_problem(
-            robot, recordings, cutoff, settings, relative_width=width, moving_only=moving_only, quick=True
-        )
-        energy.append(cross_validated_energy(Ridge(standard_errors=False), problem.moments, problem.regressor.prior))
+        regressor = regressor_for(robot, motions, settings, width)
+        moments = sum_moments(regressor, motions, cutoff, settings)
+        energy.append(cross_validated_energy(Ridge(standard_errors=False), moments, regressor.prior))
         progress((k + 1) / len(RELATIVE_WIDTHS))
     error = np.sqrt(energy)  # (widths, nv)
     good_enough = error <= (1.0 + WORTHWHILE_GAIN) * error.min(axis=0)

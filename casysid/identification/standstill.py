@@ -7,6 +7,7 @@ motion, they tell of weight and of friction and stay.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.dynamics import Coulomb
 from casysid.estimation import Ridge
-from casysid.identification.problem import USUAL_WIDTH, Mask, build_problem
+from casysid.identification.problem import USUAL_WIDTH, Mask, make_motions, regressor_for, sum_moments
 from casysid.identification.settings import Settings
 from casysid.recording import Recording
 from casysid.robot import Robot
@@ -34,14 +35,12 @@ def choose_moving_only(
     """Degrees of freedom whose stands parameters fitted to motion cannot explain, shape (nv,)."""
     if cutoff is None or not any(isinstance(column, Coulomb) for column in settings.friction):
         return np.zeros(robot.nv, dtype=bool)
-    whole, moving = (
-        build_problem(
-            robot, recordings, cutoff, settings, relative_width=relative_width, moving_only=left_out, quick=True
-        )
-        for left_out in (False, True)
-    )
-    fitted = Ridge(standard_errors=False).estimate(moving.moments, moving.regressor.prior).parameters
-    energy = [problem.moments.residual_energy(fitted).sum(axis=0) for problem in (whole, moving)]
-    rows = [problem.moments.count.sum(axis=0) for problem in (whole, moving)]
+    moving = make_motions(robot, recordings, cutoff, settings, moving_only=True, quick=True)
+    whole = [dataclasses.replace(motion, standing=np.zeros_like(motion.standing)) for motion in moving]
+    regressor = regressor_for(robot, moving, settings, relative_width)
+    of_whole, of_moving = (sum_moments(regressor, motions, cutoff, settings) for motions in (whole, moving))
+    fitted = Ridge(standard_errors=False).estimate(of_moving, regressor.prior).parameters
+    energy = [moments.residual_energy(fitted).sum(axis=0) for moments in (of_whole, of_moving)]
+    rows = [moments.count.sum(axis=0) for moments in (of_whole, of_moving)]
     stands, stand_rows = energy[0] - energy[1], rows[0] - rows[1]
     return np.asarray(stands * rows[1] > LEAST_EXCESS**2 * energy[1] * stand_rows)

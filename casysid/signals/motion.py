@@ -15,7 +15,7 @@ from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.robot.coordinates import configuration_from_channels, state_from_channels
 from casysid.signals.noise import position_noise
-from casysid.signals.smoothing import build_smoother
+from casysid.signals.smoothing import Smoother, build_smoother
 from casysid.signals.standstill import standing
 
 MINIMUM_SAMPLES = 8
@@ -87,12 +87,14 @@ def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | No
         return _as_logged(robot, recording)
     pieces = [piece for piece in recording.segments if piece.stop - piece.start >= MINIMUM_SAMPLES]
     wanted = [_rows_with_motion(recording, piece) for piece in pieces]
+    smoothers = [build_smoother(recording.time[piece], cutoff) for piece in pieces]
     smoothed = [
-        _smooth_piece(robot, recording, piece, rows, cutoff) for piece, rows in zip(pieces, wanted, strict=True)
+        _smooth_piece(robot, recording, smoother, piece, rows)
+        for smoother, piece, rows in zip(smoothers, pieces, wanted, strict=True)
     ]
     q, v, a = (np.concatenate([piece[k] for piece in smoothed]) for k in range(3))
     rows = np.concatenate(wanted)
-    longest = max(pieces, key=lambda piece: piece.stop - piece.start)
+    smoother, longest = max(zip(smoothers, pieces, strict=True), key=lambda pair: len(pair[0].time))
     noise = position_noise(recording.time[longest], recording.position[longest])
     return Motion(
         time=recording.time[rows],
@@ -100,7 +102,7 @@ def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | No
         v=v,
         a=a,
         tau=recording.torque[rows],
-        velocity_noise=_velocity_noise(robot, recording.time[longest], noise, cutoff),
+        velocity_noise=_velocity_noise(robot, smoother, noise),
         standing=_standing(robot, recording, pieces, wanted, noise, v, cutoff),
         cutoff=cutoff,
     )
@@ -150,17 +152,18 @@ def _rows_with_motion(recording: Recording, piece: slice) -> npt.NDArray[np.intp
 
 
 def _smooth_piece(
-    robot: Robot, recording: Recording, piece: slice, rows: npt.NDArray[np.intp], cutoff: float
+    robot: Robot, recording: Recording, smoother: Smoother, piece: slice, rows: npt.NDArray[np.intp]
 ) -> tuple[Array, Array, Array]:
     assert recording.time is not None
-    smoother, position = build_smoother(recording.time[piece], cutoff), recording.position[piece]
     at = recording.time[rows] - recording.torque_delay if recording.torque_delay else None
-    return state_from_channels(robot, *(smoother.smooth(position, order, at) for order in range(3)))
+    return state_from_channels(robot, *smoother.states(recording.position[piece], at))
 
 
-def _velocity_noise(robot: Robot, time: Array, channel_noise: Array, cutoff: float) -> Array:
+def _velocity_noise(robot: Robot, smoother: Smoother, channel_noise: Array) -> Array:
     """Noise of the smoothed velocity of each degree of freedom, for joints with one channel each."""
-    gain = np.sqrt(build_smoother(time[: min(len(time), LONGEST_RESPONSE)], cutoff).noise_covariance()[1, 1])
+    if len(smoother.time) > LONGEST_RESPONSE:
+        smoother = build_smoother(smoother.time[:LONGEST_RESPONSE], smoother.cutoff)
+    gain = np.sqrt(smoother.noise_covariance()[1, 1])
     noise = np.zeros(robot.nv)
     rates, channels = _single_channels(robot)
     noise[rates] = gain * channel_noise[channels]

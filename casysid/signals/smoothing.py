@@ -12,6 +12,7 @@ Euler-Lagrange equation ``x + (-1)^d ω_c^{-2d} x^{(2d)} = y``.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -50,17 +51,23 @@ class Smoother:
             derivative: Of which order.
             at: Times [s], shape (M,), not beyond the samples; None takes the sample times.
         """
+        return np.asarray(self._basis_at(derivative, at) @ self._coefficients(values))
+
+    def states(self, values: Array, at: Array | None = None) -> tuple[Array, Array, Array]:
+        """The smoothed ``values``, their first and second derivatives, as :meth:`smooth` gives them one by one."""
+        coefficients = self._coefficients(values)
+        value, rate, second = (np.asarray(self._basis_at(k, at) @ coefficients) for k in range(3))
+        return value, rate, second
+
+    def _coefficients(self, values: Array) -> Array:
         if len(values) != len(self.time):
             raise ParameterError(f"smoother: built for {len(self.time)} samples, got {len(values)}")
-        coefficients = cho_solve_banded((self._factor, True), self._basis.T @ values)
-        if derivative == 0 and at is None:
-            return np.asarray(self._basis @ coefficients)
-        times = self.time if at is None else at
-        return np.asarray(derivative_basis(times, self._knots, self._degree, derivative) @ coefficients)
+        return np.asarray(cho_solve_banded((self._factor, True), self._basis.T @ values))
 
-    @property
-    def _degree(self) -> int:
-        return 2 * self.order - 1
+    def _basis_at(self, derivative: int, at: Array | None) -> Any:
+        if derivative == 0 and at is None:
+            return self._basis
+        return derivative_basis(self.time if at is None else at, self._knots, 2 * self.order - 1, derivative)
 
     def gain(self, frequency: Array) -> Array:
         """Gain at frequencies [Hz], away from the ends: ``1 / (1 + (f/f_c)^{2d})``."""
@@ -70,7 +77,7 @@ class Smoother:
         """Responses of value, first and second derivative to a unit impulse at the middle sample, shape (3, N)."""
         impulse = np.zeros(len(self.time))
         impulse[len(impulse) // 2] = 1.0
-        return np.stack([self.smooth(impulse, derivative) for derivative in range(3)])
+        return np.stack(self.states(impulse))
 
     def noise_covariance(self) -> Array:
         """``H Hᵀ``, shape (3, 3): covariance of value, first and second derivative for white noise of unit variance."""
@@ -96,11 +103,10 @@ def build_smoother(time: Array, cutoff: float, order: int = 3) -> Smoother:
     degree, step = 2 * order - 1, float(np.median(steps))
     knots, spacing = _knots(time, max(1.0 / (KNOTS_PER_CUTOFF_PERIOD * cutoff), step), degree)
     basis = derivative_basis(time, knots, degree, 0)
-    penalty = (2.0 * np.pi * cutoff) ** (-2 * order) / step
-    normal = basis.T @ basis + penalty * _roughness(knots, degree, order, spacing)
-    banded = np.zeros((degree + 1, normal.shape[0]))
+    normal = basis.T @ basis
+    banded = (2.0 * np.pi * cutoff) ** (-2 * order) / step * _roughness(normal.shape[0], order, spacing)
     for offset in range(min(degree + 1, normal.shape[0])):
-        banded[offset, : normal.shape[0] - offset] = normal.diagonal(-offset)
+        banded[offset, : normal.shape[0] - offset] += normal.diagonal(-offset)
     return Smoother(
         time=frozen(time),
         cutoff=float(cutoff),
@@ -133,10 +139,28 @@ def derivative_basis(time: Array, knots: Array, degree: int, derivative: int) ->
     return (basis @ differences).tocsr()
 
 
-def _roughness(knots: Array, degree: int, order: int, spacing: float) -> Any:
-    """``∫ B_i^{(d)} B_j^{(d)} dt`` between the outer samples, by Gauss-Legendre, exact for the polynomial pieces."""
+def _roughness(size: int, order: int, spacing: float) -> Array:
+    """``∫ B_i^{(d)} B_j^{(d)} dt`` between the outer samples, the lower bands of the matrix, shape (2 d, size).
+
+    Pairs that no end cuts are alike, so a spline of few intervals has all there are.
+    """
+    degree = 2 * order - 1
+    few = min(size, 3 * degree + 1)
+    small = _dense_roughness(few - degree, order) * spacing ** (1 - 2 * order)
+    bands = np.zeros((degree + 1, size))
+    for offset in range(min(degree + 1, few)):
+        band = np.diagonal(small, -offset)
+        middle = np.full(size - few, band[min(degree, len(band) - 1)])
+        bands[offset, : size - offset] = np.concatenate([band[:degree], middle, band[degree:]])
+    return bands
+
+
+@lru_cache
+def _dense_roughness(intervals: int, order: int) -> Array:
+    """The matrix for knots a unit apart, by Gauss-Legendre, exact for the polynomial pieces."""
+    degree = 2 * order - 1
     nodes, weights = np.polynomial.legendre.leggauss(degree - order + 1)
-    starts = knots[degree : -degree - 1]
-    points = (starts[:, None] + (nodes + 1.0) / 2.0 * spacing).ravel()
+    points = (np.arange(intervals)[:, None] + (nodes + 1.0) / 2.0).ravel()
+    knots = np.arange(-degree, intervals + degree + 1.0)
     derivative = derivative_basis(points, knots, degree, order)
-    return derivative.T @ sparse.diags_array(np.tile(weights * spacing / 2.0, len(starts))) @ derivative
+    return frozen((derivative.T @ sparse.diags_array(np.tile(weights / 2.0, intervals)) @ derivative).toarray())

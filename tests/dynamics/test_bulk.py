@@ -89,6 +89,15 @@ def test_an_input_may_be_the_same_for_all_samples():
     np.testing.assert_array_equal(Bulk(ARITHMETIC).evaluate(x[0], y[3]), wanted[:1])
 
 
+def test_an_input_may_be_settled_beforehand():
+    x, y = samples(10)
+    evaluator = Bulk(ARITHMETIC)
+    for k in range(3):
+        np.testing.assert_array_equal(evaluator.given(y[k]).evaluate(x), evaluator.evaluate(x, y[k]))
+    with pytest.raises(ParameterError, match=r"wants x \(N, 1\)"):
+        evaluator.given(y[0]).evaluate(x, y)
+
+
 def test_no_samples_give_no_values():
     assert Bulk(ARITHMETIC).evaluate(*samples(0)).shape == (0, 4)
 

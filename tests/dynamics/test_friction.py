@@ -156,3 +156,14 @@ def test_friction_that_does_not_fit_the_robot_is_refused(friction, couplings, me
 def test_a_coupling_needs_different_joints_with_one_weight_each(joints):
     with pytest.raises(ParameterError, match="two or more different joints and one weight for each"):
         Coupling(joints, (1.0, 1.0))
+
+
+def test_regressors_that_differ_in_widths_share_their_algebra_and_keep_their_widths():
+    sharp, blunt = (build_regressor(WRIST, friction=[Viscous(), Coulomb(width)]) for width in ((0.1, 0.2, 0.3), 2.0))
+    assert sharp.template is blunt.template
+    _, v, _ = MOTION
+    dry = [sharp.names.index(f"{dof}.coulomb") for dof in WRIST.dofs]
+    for regressor, width in ((sharp, np.array([0.1, 0.2, 0.3])), (blunt, 2.0)):
+        wanted = np.einsum("nj,jk->njk", np.tanh(v / width), np.eye(3))
+        np.testing.assert_allclose(regressor.evaluate(*MOTION)[:, :, dry], wanted, atol=1e-15)
+        np.testing.assert_allclose(regressor.function(*(x[0] for x in MOTION)).full()[:, dry], wanted[0], atol=1e-15)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from casysid.errors import ParameterError
 from casysid.signals import build_smoother
+from casysid.signals.smoothing import KNOTS_PER_CUTOFF_PERIOD, derivative_basis
 
 
 @st.composite
@@ -96,3 +97,20 @@ def test_bad_requests_are_named(time, cutoff, message):
 def test_values_of_another_length_are_refused():
     with pytest.raises(ParameterError, match="built for 50 samples, got 49"):
         build_smoother(np.arange(50.0), 0.1).smooth(np.zeros(49))
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("seconds", [0.5, 4.0, 30.0])
+def test_the_spline_minimises_misfit_and_roughness(order, seconds):
+    """Against the same minimum found densely, with the roughness integrated over the whole span."""
+    cutoff, degree, rng = 0.7, 2 * order - 1, np.random.default_rng(order)
+    time = np.linspace(0.0, seconds, 40)
+    values, step = rng.normal(size=40), time[1]
+    intervals = max(int(np.ceil(seconds / max(1.0 / (KNOTS_PER_CUTOFF_PERIOD * cutoff), step))), 1)
+    knots = seconds / intervals * np.arange(-degree, intervals + degree + 1)
+    nodes, weights = np.polynomial.legendre.leggauss(degree)
+    points = (knots[degree : -degree - 1, None] + (nodes + 1.0) / 2.0 * seconds / intervals).ravel()
+    basis, rough = (derivative_basis(at, knots, degree, k).toarray() for at, k in ((time, 0), (points, order)))
+    penalty = (2.0 * np.pi * cutoff) ** (-2 * order) / step * np.tile(weights * seconds / intervals / 2.0, intervals)
+    wanted = basis @ np.linalg.solve(basis.T @ basis + rough.T @ (penalty[:, None] * rough), basis.T @ values)
+    np.testing.assert_allclose(build_smoother(time, cutoff, order).smooth(values), wanted, atol=1e-6)

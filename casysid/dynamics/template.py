@@ -1,0 +1,169 @@
+"""What the regressors of one robot share that differ in nothing but how sharply friction changes its sign.
+
+A search over widths of smooth signs makes many regressors. The widths are inputs of the functions here, so that the
+mechanism's algebra is done, and its code compiled, only once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from casysid.arrays import Array, frozen
+from casysid.dynamics import symbolic
+from casysid.dynamics.bulk import Bulk
+from casysid.dynamics.drive import ColumnMaker, Parameter, drive_columns
+from casysid.dynamics.friction import Coupling, Direction, FrictionColumn, SmoothSign
+from casysid.dynamics.joints import constant
+from casysid.robot import Robot
+
+_INERTIAL = {
+    "m": "kg", "mcx": "kg m", "mcy": "kg m", "mcz": "kg m",
+    "Ixx": "kg m^2", "Ixy": "kg m^2", "Iyy": "kg m^2", "Ixz": "kg m^2", "Iyz": "kg m^2", "Izz": "kg m^2",
+}  # fmt: skip
+_POSITIVE = {"m", "Ixx", "Iyy", "Izz"}
+KEPT = 4
+"""Templates that are kept for the next regressor."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Template:
+    """``tau = Y(q, v, a; widths) θ``.
+
+    Attributes:
+        robot: Whose torques these are.
+        parameters: What the p columns multiply.
+        function: ``casadi.Function`` ``(q, v, a, widths) -> Y``, sparse, shape (nv, p).
+        torque: ``casadi.Function`` ``(q, v, a, parameters, widths) -> tau``.
+        signs: Kind of friction and direction of every smooth sign whose width is an input.
+    """
+
+    robot: Robot
+    parameters: tuple[Parameter, ...]
+    function: Any
+    torque: Any
+    signs: tuple[tuple[str, Direction], ...] = ()
+
+    @cached_property
+    def row_columns(self) -> tuple[npt.NDArray[np.intp], ...]:
+        """For each degree of freedom, the columns that are structurally nonzero in its row of ``Y``."""
+        rows, columns = (np.array(index, dtype=np.intp) for index in self.function.sparsity_out(0).get_triplet())
+        return tuple(np.sort(columns[rows == dof]) for dof in range(self.robot.nv))
+
+    @cached_property
+    def equations(self) -> Bulk:
+        """``(q, v, a, tau, widths)`` -> for each degree of freedom its row's nonzeros, then its torque."""
+        state, tau = symbolic.State.of(self.robot), ca.SX.sym("tau", self.robot.nv)
+        widths = ca.SX.sym("widths", len(self.signs))
+        Y = self.function(state.q, state.v, state.a, widths)
+        entries = [
+            entry
+            for dof, columns in enumerate(self.row_columns)
+            for entry in (*(Y[dof, int(column)] for column in columns), tau[dof])
+        ]
+        inputs = [state.q, state.v, state.a, tau, widths]
+        names = ["q", "v", "a", "tau", "widths"]
+        return Bulk(ca.Function("equations", inputs, [ca.vertcat(*entries)], names, ["rows"], {"cse": True}))
+
+    @cached_property
+    def torques(self) -> Bulk:
+        """``(q, v, a, parameters, widths) -> tau``."""
+        return Bulk(self.torque)
+
+    def widths(self, friction: Sequence[FrictionColumn]) -> Array:
+        """The widths of some friction's smooth signs, in the order of the input.
+
+        Raises:
+            ParameterError: A width is missing.
+        """
+        smooth = {column.kind: column for column in friction if isinstance(column, SmoothSign)}
+        return frozen([smooth[kind].width_at(direction) for kind, direction in self.signs])
+
+
+def build_template(
+    robot: Robot,
+    friction: Sequence[FrictionColumn],
+    couplings: Sequence[Coupling],
+    quasi_static: bool,
+    gains: Sequence[float],
+) -> Template:
+    """The template for some friction, whatever its widths; arguments as :func:`~casysid.dynamics.build_regressor`.
+
+    Raises:
+        ParameterError: A coupling names an unknown joint, or a column uses a position that is none.
+    """
+    widthless = tuple(replace(column, width=1.0) if isinstance(column, SmoothSign) else column for column in friction)
+    arguments = robot, widthless, tuple(couplings), quasi_static, tuple(gains)
+    try:
+        return _kept(*arguments)
+    except TypeError:  # a column holds what cannot be hashed, such as a velocity for each joint's name
+        return _build(*arguments)
+
+
+def finish_template(
+    robot: Robot,
+    state: symbolic.State,
+    parameters: tuple[Parameter, ...],
+    Y: Any,
+    theta: Any,
+    tau: Any,
+    signs: Sequence[tuple[str, Direction, Any]] = (),
+) -> Template:
+    """The functions of expressions for ``Y`` and ``tau`` in a state, ``theta`` and the symbols of the signs' widths."""
+    inputs, names = [state.q, state.v, state.a], ["q", "v", "a"]
+    widths = ca.vertcat(ca.SX(0, 1), *(width for _, _, width in signs))
+    return Template(
+        robot=robot,
+        parameters=parameters,
+        function=ca.Function(
+            "regressor", [*inputs, widths], [ca.sparsify(Y)], [*names, "widths"], ["Y"], {"cse": True}
+        ),
+        torque=ca.Function(
+            "torque",
+            [*inputs, theta, widths],
+            [ca.densify(tau)],
+            [*names, "parameters", "widths"],
+            ["tau"],
+            {"cse": True},
+        ),
+        signs=tuple((kind, direction) for kind, direction, _ in signs),
+    )
+
+
+def _build(
+    robot: Robot,
+    friction: tuple[FrictionColumn, ...],
+    couplings: tuple[Coupling, ...],
+    quasi_static: bool,
+    gains: tuple[float, ...],
+) -> Template:
+    state, still = symbolic.State.of(robot), ca.SX(robot.nv, 1)
+    motions = symbolic.link_motions(robot, symbolic.State(state.q, still, still) if quasi_static else state)
+    column_along = ColumnMaker(robot, symbolic.State(state.q, state.v, still) if quasi_static else state)
+    drive = list(drive_columns(column_along, friction, couplings))
+    drive_matrix = ca.horzcat(ca.SX(robot.nv, 0), *(column for _, column in drive))
+    parameters = (*_inertial_parameters(robot), *(parameter for parameter, _ in drive))
+    rigid = robot.inertial_parameters.size
+    theta = ca.SX.sym("parameters", len(parameters))
+    measured = ca.diag(constant(np.array(gains)))
+    Y = measured @ ca.horzcat(symbolic.regressor(robot, motions), drive_matrix)
+    tau = measured @ (symbolic.inverse_dynamics(robot, motions, theta[:rigid]) + drive_matrix @ theta[rigid:])
+    return finish_template(robot, state, parameters, Y, theta, tau, column_along.signs)
+
+
+_kept = lru_cache(KEPT)(_build)
+
+
+def _inertial_parameters(robot: Robot) -> tuple[Parameter, ...]:
+    values = robot.inertial_parameters.reshape(-1, len(_INERTIAL))
+    return tuple(
+        Parameter(f"{link}.{kind}", link, kind, unit, kind in _POSITIVE, float(prior))
+        for link, priors in zip(robot.links, values, strict=True)
+        for (kind, unit), prior in zip(_INERTIAL.items(), priors, strict=True)
+    )
