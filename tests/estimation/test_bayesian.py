@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from casysid.errors import ParameterError
-from casysid.estimation.base import Estimator, Status
+from casysid.estimation.base import Estimator
 from casysid.estimation.bayesian import BayesianDenoising, effective_rows
 from casysid.estimation.denoising import Start
 from casysid.estimation.joint_factor_analysis import JointFactorAnalysis
@@ -18,6 +18,7 @@ from casysid.estimation.least_squares import OrdinaryLeastSquares, WeightedLeast
 from casysid.estimation.standardise import seen_directions, solve_least_squares, standardise
 from casysid.estimation.stepwise import StepwiseRegression
 from casysid.moments import Moments
+from tests.estimation.draws import draw_moments, with_columns
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 LAW = settings(max_examples=8, deadline=None)
@@ -30,76 +31,6 @@ ESTIMATORS: list[Estimator] = [
     JointFactorAnalysis(vector="noiseless"),
 ]
 every_estimator = pytest.mark.parametrize("estimator", ESTIMATORS, ids=lambda e: f"{e.name}-{e.vector}")
-
-
-def draw_moments(rng: np.random.Generator, joints: int = 2, blocks: int = 4, n: int = 60, p: int = 6) -> Moments:
-    """Half the columns relevant, some noise in all of them, joints of unlike size and noise."""
-    truth = np.where(np.arange(p) % 2 == 0, rng.uniform(0.5, 2.0, p) * rng.choice([-1.0, 1.0], p), 0.0)
-    gram = np.empty((blocks, joints, p + 1, p + 1))
-    for b, j in np.ndindex(blocks, joints):
-        t = (j + 1.0) * rng.standard_normal((n, p))
-        x = t + 0.1 * rng.standard_normal((n, p))
-        rows = np.column_stack([x, t @ truth + 0.3 * (3.0 * j + 1.0) * rng.standard_normal(n)])
-        gram[b, j] = rows.T @ rows
-    columns, names = (tuple(f"{letter}{k}" for k in range(m)) for letter, m in (("x", p), ("joint_", joints)))
-    return Moments(gram, np.full((blocks, joints), float(n)), columns, names)
-
-
-def transformed(moments: Moments, transform: np.ndarray, columns: tuple[str, ...]) -> Moments:
-    """Moments of the rows ``r`` multiplied by ``transform``."""
-    return Moments(transform.T @ moments.gram @ transform, moments.count, columns, moments.joints)
-
-
-def with_columns(moments: Moments, mixing: np.ndarray) -> Moments:
-    """Moments of the columns multiplied by ``mixing``, the output as it is."""
-    transform = np.zeros((mixing.shape[0] + 1, mixing.shape[1] + 1))
-    transform[:-1, :-1], transform[-1, -1] = mixing, 1.0
-    return transformed(moments, transform, tuple(f"x{k}" for k in range(mixing.shape[1])))
-
-
-@every_estimator
-@LAW
-@given(seed=seeds)
-def test_the_order_of_columns_does_not_matter(estimator: Estimator, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    moments, order = draw_moments(rng), rng.permutation(6)
-    expected = estimator.estimate(moments)
-    found = estimator.estimate(with_columns(moments, np.eye(6)[:, order]))
-    np.testing.assert_allclose(found.parameters, expected.parameters[order], atol=5e-4)
-    np.testing.assert_allclose(found.std, expected.std[order], rtol=1e-2)
-
-
-@every_estimator
-@LAW
-@given(seed=seeds)
-def test_parameters_follow_the_units_of_columns_and_target(estimator: Estimator, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    moments, units = draw_moments(rng), 10.0 ** rng.uniform(-4, 4, 7)
-    expected = estimator.estimate(moments)
-    found = estimator.estimate(transformed(moments, np.diag(units), moments.columns))
-    factor = units[-1] / units[:-1]
-    np.testing.assert_allclose(found.parameters / factor, expected.parameters, atol=5e-4)
-    np.testing.assert_allclose(found.std / factor, expected.std, rtol=1e-2)
-    np.testing.assert_allclose(found.noise_std / units[-1], expected.noise_std, rtol=1e-3)
-    metric = found.metric * np.outer(factor, factor)
-    np.testing.assert_allclose(metric, expected.metric, atol=1e-3 * np.abs(expected.metric).max())
-
-
-@every_estimator
-@LAW
-@given(seed=seeds)
-def test_an_empty_column_changes_nothing_and_stays_at_the_prior(estimator: Estimator, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    moments, prior = draw_moments(rng), 0.1 * rng.standard_normal(7)
-    widened = with_columns(moments, np.insert(np.eye(6), 3, 0.0, axis=1))
-    found = estimator.estimate(widened, prior)
-    expected = estimator.estimate(moments, np.delete(prior, 3))
-    np.testing.assert_allclose(np.delete(found.parameters, 3), expected.parameters, atol=5e-4)
-    np.testing.assert_allclose(np.delete(found.std, 3), expected.std, rtol=1e-2)
-    assert found.parameters[3] == prior[3]
-    assert np.isinf(found.std[3])
-    assert not found.metric[3].any()
-    assert found.rank == expected.rank == 6
 
 
 @every_estimator
@@ -131,36 +62,6 @@ def test_moments_that_are_added_count_like_the_data_together(estimator: Estimato
     added = estimator.estimate(Moments.from_rows(x[:60], y[:60]) + Moments.from_rows(x[60:], y[60:]))
     np.testing.assert_array_equal(added.parameters, together.parameters)
     np.testing.assert_array_equal(added.covariance, together.covariance)
-
-
-@every_estimator
-@LAW
-@given(seed=seeds)
-def test_the_scale_of_a_joints_rows_does_not_matter(estimator: Estimator, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    moments = draw_moments(rng)
-    scale = np.array([1.0, 10.0 ** rng.uniform(-2, 2)])
-    louder = Moments(moments.gram * scale[:, None, None] ** 2, moments.count, moments.columns, moments.joints)
-    found, expected = estimator.estimate(louder), estimator.estimate(moments)
-    np.testing.assert_allclose(found.parameters, expected.parameters, atol=5e-4)
-    np.testing.assert_allclose(found.noise_std / scale, expected.noise_std, rtol=1e-3)
-
-
-@every_estimator
-@pytest.mark.parametrize("truth", [np.array([3.0, 0.0, -2.0, 0.5, 0.0]), np.array([1.0, -2.0, 3.0, -4.0, 5.0])])
-def test_without_noise_the_truth_is_found(estimator: Estimator, truth: np.ndarray) -> None:
-    x = np.random.default_rng(0).standard_normal((200, 5))
-    estimate = estimator.estimate(Moments.from_rows(x, x @ truth, blocks=5))
-    np.testing.assert_allclose(estimate.parameters, truth, atol=1e-7)
-
-
-@every_estimator
-def test_moments_that_say_nothing_return_the_prior(estimator: Estimator) -> None:
-    estimate = estimator.estimate(Moments.from_rows(np.zeros((10, 3)), np.zeros(10), blocks=2), np.arange(3.0))
-    assert estimate.status is Status.DEGENERATE
-    assert estimate.parameters.tolist() == [0.0, 1.0, 2.0]
-    assert np.isinf(estimate.std).all()
-    assert estimate.noise_std.shape == (1,)
 
 
 @every_estimator
