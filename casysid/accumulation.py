@@ -6,7 +6,10 @@ keeps the sum of squares of its own short rows ``[x, y]``, and only the sums are
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import groupby
+from operator import itemgetter
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -16,12 +19,13 @@ from casysid.arrays import Array
 from casysid.dynamics.regressor import Regressor
 from casysid.errors import ParameterError
 from casysid.moments import Moments
-from casysid.signals.averaging import BandAverage
+from casysid.signals.averaging import BandAverage, WindowSums
 
 LARGEST_INVALID_SHARE = 0.01
 """An average counts for a joint if no more than this share of its weight lies on samples that do not."""
 
 Mask = npt.NDArray[np.bool_]
+Part = TypeVar("Part")
 
 
 def accumulate_moments(
@@ -64,36 +68,68 @@ def accumulate_moments(
         raise ParameterError(f"moments: blocks must be at least 1; got {blocks}")
     groups = np.array_split(chosen, min(blocks, len(chosen)))
     widths = [len(columns) + 1 for columns in regressor.row_columns]
-    rows, squares = np.cumsum([0, *widths]), np.cumsum([0, *(width**2 for width in widths)])
-
-    def square(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, Array, Array]:
-        packed, kept = np.empty(squares[-1]), None if own is None else own[piece]
-        if average is not None:
-            weights = average.weights(piece)
-            values = np.ascontiguousarray((weights @ values.T).T)
-            kept = None if kept is None else weights @ ~kept <= LARGEST_INVALID_SHARE
-        count = np.full(len(widths), float(values.shape[1])) if kept is None else kept.sum(axis=0, dtype=np.float64)
-        for joint, width in enumerate(widths):
-            x = values[rows[joint] : rows[joint + 1]]
-            if count[joint] < x.shape[1]:
-                x = x[:, kept[:, joint]]  # type: ignore[index]
-            np.matmul(x, x.T, out=packed[squares[joint] : squares[joint + 1]].reshape(width, width))
-        return len(piece), count, packed
-
-    sums, counts, done = np.zeros((len(groups), squares[-1])), np.zeros((len(groups), len(widths))), 0
+    sums, counts = np.zeros((len(groups), sum(width**2 for width in widths))), np.zeros((len(groups), len(widths)))
     with threadpool_limits(1, user_api="blas"):  # threads of ours beside threads of BLAS would wait for each other
-        for block, (count, equations, packed) in regressor.equations.map(square, inputs, groups, threads):
-            sums[block] += packed
-            counts[block] += equations
-            done += count
-            if progress is not None:
-                progress(done, len(chosen))
-    return _spread(regressor, sums, squares, counts)
+        if average is None:
+
+            def square(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, tuple[Array, Array]]:
+                return len(piece), _squares(values, widths, None if own is None else own[piece])
+
+            pieces = regressor.equations.map(square, inputs, groups, threads)
+            for block, (equations, packed) in _reported(pieces, len(chosen), progress):
+                counts[block] += equations
+                sums[block] += packed
+        else:
+            windows = [average.windows(group) for group in groups]
+            starts = np.array([group[0] for group in groups])
+
+            def fill(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, WindowSums]:
+                rows = values if own is None else np.vstack([values, ~own[piece].T])
+                block = np.searchsorted(starts, piece[0], side="right") - 1
+                return len(piece), windows[block].sums(piece, rows.T)
+
+            filled = regressor.equations.map(fill, inputs, groups, threads)
+            for block, parts in groupby(_reported(filled, len(chosen), progress), itemgetter(0)):
+                rows = windows[block].averages(part for _, part in parts).T
+                kept = None if own is None else rows[-len(widths) :].T <= LARGEST_INVALID_SHARE
+                counts[block], sums[block] = _squares(rows[: sum(widths)], widths, kept)
+    return _spread(regressor, sums, widths, counts)
 
 
-def _spread(regressor: Regressor, sums: Array, squares: npt.NDArray[np.intp], counts: Array) -> Moments:
+def _reported(
+    pieces: Iterable[tuple[int, tuple[int, Part]]], samples: int, progress: Callable[[int, int], None] | None
+) -> Iterator[tuple[int, Part]]:
+    """Number of the block and what was made of each piece, while progress hears of its samples."""
+    done = 0
+    for block, (count, part) in pieces:
+        done += count
+        if progress is not None:
+            progress(done, samples)
+        yield block, part
+
+
+def _squares(values: Array, widths: Sequence[int], kept: Mask | None) -> tuple[Array, Array]:
+    """Rows counted for each joint, and the sums of their squares side by side.
+
+    Args:
+        values: The joints' short rows ``[x, y]``, one joint below the other, shape (sum of widths, samples).
+        widths: Of each joint's.
+        kept: Which samples count for which joint, shape (samples, joints); None counts all.
+    """
+    count = np.full(len(widths), float(values.shape[1])) if kept is None else kept.sum(axis=0, dtype=np.float64)
+    rows, squares = np.cumsum([0, *widths]), np.cumsum([0, *(width**2 for width in widths)])
+    packed = np.empty(squares[-1])
+    for joint, width in enumerate(widths):
+        x = values[rows[joint] : rows[joint + 1]]
+        if kept is not None and count[joint] < x.shape[1]:
+            x = x[:, kept[:, joint]]
+        np.matmul(x, x.T, out=packed[squares[joint] : squares[joint + 1]].reshape(width, width))
+    return count, packed
+
+
+def _spread(regressor: Regressor, sums: Array, widths: Sequence[int], counts: Array) -> Moments:
     """The joints' short sums in their places among all columns."""
-    p = len(regressor.names)
+    p, squares = len(regressor.names), np.cumsum([0, *(width**2 for width in widths)])
     gram = np.zeros((len(sums), regressor.robot.nv, p + 1, p + 1))
     for joint, columns in enumerate(regressor.row_columns):
         places, width = np.append(columns, p), len(columns) + 1

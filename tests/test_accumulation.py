@@ -60,6 +60,17 @@ def test_the_sums_do_not_depend_on_threads_or_chunks(monkeypatch):
     assert_same(accumulate_moments(REGRESSOR, *samples, blocks=3), once)
 
 
+def test_averages_do_not_depend_on_threads_or_chunks(monkeypatch):
+    samples, average = log(ROBOT, 5000, np.random.default_rng(12)), BandAverage(np.arange(5000) * 0.01, 1.0)
+    valid = np.random.default_rng(13).random((5000, 3)) > 1e-3
+    once, own = (accumulate_moments(REGRESSOR, *samples, average=average, valid=x, blocks=3) for x in (None, valid))
+    monkeypatch.setattr(replay, "SAMPLES", 130)
+    for mask, wanted in ((None, once), (valid, own)):
+        got = accumulate_moments(REGRESSOR, *samples, average=average, valid=mask, blocks=3, threads=3)
+        assert_same(got, wanted)
+    assert (own.count < once.count).any()
+
+
 def test_both_routes_give_the_same_sums(tmp_path, monkeypatch):
     samples = log(ROBOT, 3000, np.random.default_rng(3))
     replayed = accumulate_moments(build_regressor(ROBOT), *samples)

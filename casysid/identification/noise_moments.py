@@ -5,9 +5,9 @@ grow by is what the noise that was there has added. It holds for every joint typ
 colour that smoothing gives it; for small noise it is ``Σ J P Jᵀ`` and the bias of the mean. Noise that no low-pass has
 made small is added twice over as well, and a parabola in its variance is carried back to zero.
 
-Where positions are smoothed, Coulomb friction's smooth sign is no sharper than the noise of its velocity: about the
+Where positions are smoothed, dry friction's smooth sign is no sharper than the noise of its velocity: about the
 expected sign, given what was measured. Its error is then uncorrelated with everything measured and attenuates nothing
-(Berkson), so its column is left out.
+(Berkson), so columns with such a sign are left out.
 
 Source: Cook and Stefanski 1994 (simulation-extrapolation); Berkson 1950.
 """
@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.dynamics import Coulomb, Regressor
+from casysid.dynamics import Coulomb, LoadedCoulomb, PowerViscous, Regressor, Stribeck
 from casysid.errors import ParameterError
 from casysid.recording import Recording
 from casysid.signals import InputNoise
@@ -29,7 +29,7 @@ DRAWS = 2
 LONG = 50_000
 """So many samples average well enough by themselves: one pair will do."""
 DRAWS_AS_LOGGED = 4
-EXPECTED_KINDS = (Coulomb.kind,)
+EXPECTED_KINDS = (Coulomb.kind, LoadedCoulomb.kind, PowerViscous.kind, Stribeck.kind)
 """Columns that are an expectation, given the noisy motion, and not a noisy value."""
 
 

@@ -10,8 +10,9 @@ Source: the parallel low-pass and decimation of the field (Gautier 1997), its wi
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -41,10 +42,13 @@ class BandAverage:
 
     def weights(self, samples: npt.NDArray[np.intp]) -> Any:
         """Sparse weights of the windows over some consecutive samples, shape (windows, samples); rows sum to one."""
-        time = self.time[samples]
-        weights, total = _windows(time, self._knots(time))
-        kept = total > SMALLEST_SHARE * total.max()
+        weights, total = _windows(self.time[samples], self._knots(self.time[samples]))
+        kept = _full_enough(total)
         return sparse.diags_array(1.0 / total[kept]) @ weights[kept]
+
+    def windows(self, samples: npt.NDArray[np.intp]) -> Windows:
+        """The same windows, to be filled piece by piece."""
+        return Windows(self.time, self._knots(self.time[samples]))
 
     def beside(
         self,
@@ -85,6 +89,50 @@ class BandAverage:
         windows = max(int(np.ceil(span * self.cutoff / SPACING)), 1)
         spacing = max(span, 1e-12) / windows
         return np.asarray(time[0] + spacing * np.arange(-DEGREE, windows + DEGREE + 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """The windows over some consecutive samples, whose averages are gathered from pieces of the samples.
+
+    Attributes:
+        time: Of all samples [s], shape (N,).
+        knots: Of the windows [s].
+    """
+
+    time: Array
+    knots: Array
+
+    def sums(self, piece: npt.NDArray[np.intp], values: Array) -> WindowSums:
+        """What a piece of the samples adds, from its values of shape (samples, n)."""
+        weights, _ = _windows(self.time[piece], self.knots)
+        reached = np.flatnonzero(np.diff(weights.indptr))
+        within = slice(int(reached[0]), int(reached[-1]) + 1)
+        part = weights[within]
+        return WindowSums(within, part @ values, np.asarray(part.sum(axis=1)).ravel())
+
+    def averages(self, parts: Iterable[WindowSums]) -> Array:
+        """Averages over the windows that are full enough, shape (windows, n), from the sums of all pieces."""
+        parts = list(parts)
+        total = np.zeros(len(self.knots) - DEGREE - 1)
+        values = np.zeros((len(total), parts[0].values.shape[1]))
+        for part in parts:
+            values[part.windows] += part.values
+            total[part.windows] += part.weights
+        kept = _full_enough(total)
+        return np.asarray(values[kept] / total[kept, None])
+
+
+class WindowSums(NamedTuple):
+    """Of one piece over the windows that it reaches: weighted ``values`` (windows, n), and ``weights`` (windows,)."""
+
+    windows: slice
+    values: Array
+    weights: Array
+
+
+def _full_enough(total: Array) -> npt.NDArray[np.bool_]:
+    return np.asarray(total > SMALLEST_SHARE * total.max())
 
 
 def _windows(time: Array, knots: Array) -> tuple[Any, Array]:
