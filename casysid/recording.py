@@ -178,6 +178,35 @@ class Recording:
             return self
         return dataclasses.replace(self, time=self.time * scale, torque_delay=self.torque_delay * scale)
 
+    def flipped(self, columns: Sequence[str]) -> Recording:
+        """The recording with the signs of some columns turned.
+
+        Args:
+            columns: ``tau_<joint>``; ``q_<joint>``, its velocity and acceleration with it; ``<joint>`` for both, as
+                where its axis points the other way; ``tau`` for the torques of all joints.
+
+        Raises:
+            ParameterError: A column that is none of these, or of a joint that moves in several ways.
+        """
+        single = [name for name in self.channels if name in self.dofs]
+        known = ["tau", *(f"tau_{name}" for name in self.dofs), *(f"q_{name}" for name in single), *single]
+        unknown = [column for column in columns if column not in known]
+        if unknown:
+            raise ParameterError(f"flip: no column {', '.join(unknown)} to turn; known are {', '.join(known)}")
+        motion, torque = np.ones(len(self.dofs)), np.ones(len(self.dofs))
+        for column in columns:
+            for k, name in enumerate(self.dofs):
+                motion[k] *= -1.0 if column in (name, f"q_{name}") else 1.0
+                torque[k] *= -1.0 if column in (name, f"tau_{name}", "tau") else 1.0
+        signs = dict(zip(self.dofs, motion, strict=True))
+        return dataclasses.replace(
+            self,
+            position=self.position * [signs[name] if name in single else 1.0 for name in self.channels],
+            velocity=None if self.velocity is None else self.velocity * motion,
+            acceleration=None if self.acceleration is None else self.acceleration * motion,
+            torque=self.torque * torque,
+        )
+
     def decimated(self, factor: int) -> Recording:
         """Every ``factor``-th sample, plainly picked.
 

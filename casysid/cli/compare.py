@@ -13,6 +13,7 @@ from casysid.cli.options import (
     CouplingOption,
     CutoffOption,
     DelayOption,
+    FlipOption,
     FloatingOption,
     FrictionOption,
     FrictionWord,
@@ -40,6 +41,7 @@ def compare(
     split: SplitOption = None,
     methods: Annotated[str, typer.Option(help="Names with commas between them, or all.")] = "all",
     consistency: ConsistencyOption = ConsistencyChoice.FULL,
+    flip: FlipOption = None,
     cutoff: CutoffOption = None,
     time_scale: TimeScaleOption = None,
     delay: DelayOption = "auto",
@@ -64,7 +66,9 @@ def compare(
 
         names = [kind.name for kind in ESTIMATORS] if methods == "all" else methods.split(",")
         estimators = [estimator_by_name(name) for name in names]
-        settings = make_settings("ridge", consistency, cutoff, coupling, time_scale, delay, friction=friction)
+        settings = make_settings(
+            "ridge", consistency, cutoff, coupling, time_scale, delay, friction=friction, flip=flip
+        )
         model = load_robot(robot, gravity, lock, floating_base)
         fitted, unseen = load_recordings(model, logs, held_out, split)
         with progress_bar(console) as progress:

@@ -15,6 +15,7 @@ from casysid.cli.options import (
     CouplingOption,
     CutoffOption,
     DelayOption,
+    FlipOption,
     FloatingOption,
     FrictionOption,
     FrictionWord,
@@ -46,6 +47,7 @@ def identify(
     split: SplitOption = None,
     method: Annotated[str, typer.Option(help="Estimator; 'casysid compare' lists them.")] = "ridge",
     consistency: ConsistencyOption = ConsistencyChoice.FULL,
+    flip: FlipOption = None,
     cutoff: CutoffOption = None,
     time_scale: TimeScaleOption = None,
     delay: DelayOption = "auto",
@@ -74,7 +76,7 @@ def identify(
         from casysid.report import write_report
 
         noise = noise_levels(noise_position, noise_velocity, noise_acceleration)
-        settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise, friction)
+        settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise, friction, flip)
         model = load_robot(robot, gravity, lock, floating_base)
         fitted, unseen = load_recordings(model, logs, held_out, split)
         with progress_bar(console) as progress:

@@ -40,6 +40,12 @@ SplitOption = Annotated[
     float | None, typer.Option(help="Fit on this first share of each recording's time, hold out the rest.")
 ]
 ConsistencyOption = Annotated[ConsistencyChoice, typer.Option(help="Physical laws that the answer is made to obey.")]
+FlipOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="COLUMN", help="Turn a sign: tau_JOINT, q_JOINT, JOINT for both, tau for all torques. Repeatable."
+    ),
+]
 CutoffOption = Annotated[float | None, typer.Option(help="Low-pass cut-off [Hz]; default: chosen by the data.")]
 TimeScaleOption = Annotated[
     float | None,
@@ -149,6 +155,7 @@ def make_settings(
     delay: str = "auto",
     input_noise: NoiseLevels | None = None,
     friction: FrictionWord = FrictionWord.PLAIN,
+    flip: list[str] | None = None,
 ) -> Settings:
     """Settings from the command line's words."""
     from casysid.dynamics import Coupling
@@ -161,6 +168,7 @@ def make_settings(
     return Settings(
         method=estimator_by_name(method),
         consistency=None if consistency is ConsistencyChoice.NONE else Consistency(consistency.value),
+        flip=tuple(flip or ()),
         cutoff=cutoff,
         time_scale=time_scale,
         delay=_seconds(delay),

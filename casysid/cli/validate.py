@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from casysid.cli.options import FloatingOption, GravityOption, LockOption, LogsArgument, RobotArgument, load_robot
+from casysid.cli.options import (
+    FlipOption,
+    FloatingOption,
+    GravityOption,
+    LockOption,
+    LogsArgument,
+    RobotArgument,
+    load_robot,
+)
 
 
 def validate(
@@ -18,9 +27,10 @@ def validate(
         typer.Option(
             "--result",
             metavar="FILE",
-            help="A result.json: its friction, offset, armature, torque delay and cut-off, which URDF cannot hold.",
+            help="A result.json: its friction, offset, armature, and how it read recordings, which URDF cannot hold.",
         ),
     ] = None,
+    flip: FlipOption = None,
     cutoff: Annotated[
         float | None, typer.Option(help="Low-pass cut-off [Hz]; default: the result's, else chosen by the data.")
     ] = None,
@@ -36,24 +46,16 @@ def validate(
         from casysid.identification.output import write_json
         from casysid.recording import read_recordings
         from casysid.report.validation_tables import validation_tables
-        from casysid.validation import read_delays, read_drives, read_friction
+        from casysid.validation import EarlierResult, read_earlier_result
         from casysid.validation import validate as run
 
         model = load_robot(robot, gravity, lock, floating_base)
         recordings = read_recordings(logs, model)
-        drives, filtered = read_drives(result) if result else (None, None)
-        delays = read_delays(result) if result else None
-        friction = read_friction(result) if result else None
+        earlier = read_earlier_result(result) if result else EarlierResult()
+        if flip:
+            earlier = dataclasses.replace(earlier, flip=tuple(flip))
         with progress_bar(console) as progress:
-            validation = run(
-                model,
-                recordings,
-                drives=drives,
-                friction=friction,
-                delays=delays,
-                cutoff=cutoff or filtered,
-                progress=progress,
-            )
+            validation = run(model, recordings, earlier=earlier, cutoff=cutoff, progress=progress)
         out.mkdir(parents=True, exist_ok=True)
         write_json(validation.to_json(), out / "validation.json")
         for title, table in validation_tables(validation):

@@ -90,10 +90,26 @@ class Mistake:
         """What looks wrong, why, and that nothing was done about it."""
         others = f" (or else: {'; '.join(self.alternatives)})" if self.alternatives else ""
         before, after = self.explained
+        remedy = f", or read it so by --flip {column}" if (column := self.flip) else ""
         return (
             f"{self.words}{others}. The model file explains {before:.1%} of that torque's variance as logged, "
-            f"{after:.1%} so corrected. Nothing was changed; check the log's columns and the file's axes"
+            f"{after:.1%} so corrected. Nothing was changed; check the log's columns and the file's axes{remedy}"
         )
+
+    @property
+    def flip(self) -> str | None:
+        """What :meth:`casysid.recording.Recording.flipped` is to be told; None where a sign is not the mistake."""
+        match self.kind:
+            case MistakeKind.TORQUE_NEGATED:
+                return f"tau_{self.joints[0]}"
+            case MistakeKind.POSITION_NEGATED:
+                return f"q_{self.joints[0]}"
+            case MistakeKind.AXIS_NEGATED:
+                return self.joints[0]
+            case MistakeKind.ALL_TORQUES_NEGATED:
+                return "tau"
+            case _:
+                return None
 
     def to_json(self) -> dict[str, object]:
         """Plain words and numbers."""

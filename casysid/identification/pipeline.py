@@ -122,6 +122,7 @@ def prepare(
     if not fitted:
         raise RecordingError("identify: at least one recording to fit is needed; got none")
     clock = _Clock()
+    fitted, held_out = (tuple(one.flipped(settings.flip) for one in several) for several in (fitted, held_out))
     time_base = settle_time_base(robot, fitted, settings)
     if time_base.reason:
         warnings.warn(time_base.reason, CasysidWarning, stacklevel=3)

@@ -177,6 +177,7 @@ class IdentificationResult:
             "joints": list(by_joint),
             "samples": {"train": self.train.samples, "held_out": held_out.samples if held_out else 0},
             "seconds": round(sum(self.seconds.values()), 3),
+            "flip": list(self.settings.flip),
             "time_base": dataclasses.asdict(self.time_base),
             "torque_gains": {
                 "gains": dict(zip(by_joint, self.torque_gains.values.tolist(), strict=True)),

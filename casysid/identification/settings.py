@@ -22,6 +22,7 @@ class Settings:
         method: The estimator.
         consistency: Physical laws that the parameters are made to obey; None leaves the estimate as it is.
         knowledge: What is known beside the data, such as a total mass; used together with ``consistency``.
+        flip: Columns of the recordings whose signs are turned, as :meth:`casysid.recording.Recording.flipped` has it.
         cutoff: Low-pass cut-off [Hz]; None lets the data choose.
         delay: By how much the torque's time stamps are late against the positions' [s]; None takes it from the data.
         friction: Kinds of friction and drive columns of every joint.
@@ -40,6 +41,7 @@ class Settings:
     method: Estimator = field(default_factory=Ridge)
     consistency: Consistency | None = Consistency.FULL
     knowledge: tuple[Knowledge, ...] = ()
+    flip: tuple[str, ...] = ()
     cutoff: float | None = None
     delay: float | None = None
     friction: tuple[FrictionColumn, ...] = DEFAULT_FRICTION

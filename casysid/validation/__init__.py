@@ -1,10 +1,11 @@
 """How good parameters are: on recordings, in a controller, and against a hidden truth."""
 
+from casysid.validation.earlier import EarlierResult, read_earlier_result
 from casysid.validation.exciting import Excitation
 from casysid.validation.output import write_rehearsal
 from casysid.validation.perturbation import hidden_truth
 from casysid.validation.playback import DesignedMotion, Playback, play
-from casysid.validation.prediction import Validation, read_delays, read_drives, read_friction, validate
+from casysid.validation.prediction import Validation, validate
 from casysid.validation.rehearsal import Rehearsal, RehearsalSettings, rehearse
 from casysid.validation.tracking import Tracking, measure_tracking, track
 from casysid.validation.truth import BaseComparison, compare_base_parameters, true_coefficients, true_torque_error
@@ -12,6 +13,7 @@ from casysid.validation.truth import BaseComparison, compare_base_parameters, tr
 __all__ = [
     "BaseComparison",
     "DesignedMotion",
+    "EarlierResult",
     "Excitation",
     "Playback",
     "Rehearsal",
@@ -22,9 +24,7 @@ __all__ = [
     "hidden_truth",
     "measure_tracking",
     "play",
-    "read_delays",
-    "read_drives",
-    "read_friction",
+    "read_earlier_result",
     "rehearse",
     "track",
     "true_coefficients",

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.dynamics import DEFAULT_FRICTION, Coupling, Regressor, build_regressor, with_width
+from casysid.dynamics import DEFAULT_FRICTION, Coupling, Regressor, build_regressor
 from casysid.errors import ParameterError
 from casysid.identification import CutoffChoice, Settings, TorqueError, choose_cutoff, torque_error
-from casysid.identification.friction_model import FrictionModel, model_from_json
-from casysid.identification.problem import USUAL_WIDTH, coulomb_width, make_motion
+from casysid.identification.friction_model import FrictionModel
+from casysid.identification.problem import USUAL_WIDTH, make_motion, with_widths
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.signals import aligned
-
-Drives = Mapping[str, Mapping[str, float | None]]
-"""Friction and armature by joint and kind, as in a ``result.json``."""
+from casysid.validation.earlier import Drives, EarlierResult
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -69,22 +65,17 @@ def validate(
     robot: Robot,
     recordings: Sequence[Recording],
     *,
-    drives: Drives | None = None,
-    delays: Mapping[str, float] | None = None,
-    friction: FrictionModel | None = None,
+    earlier: EarlierResult | None = None,
     cutoff: float | None = None,
     progress: Callable[[str, float], None] = lambda stage, share: None,
 ) -> Validation:
     """Predict the torque of recordings by a model's own parameters.
 
     Args:
-        robot: Its links' parameters are judged, and its friction unless ``drives`` says otherwise.
+        robot: Its links' parameters are judged, and its friction unless ``earlier`` says otherwise.
         recordings: At least one.
-        drives: Friction, offset and armature to take instead of the file's, which has no place for all of them.
-        delays: By how much the logged torque is late, by joint [s].
-        friction: Columns and couplings that ``drives`` are the parameters of; None takes the default columns, as wide
-            as the motions ask, and couplings by their names.
-        cutoff: Low-pass [Hz] of motion and torque; None lets the data choose.
+        earlier: Friction, offset, armature and how recordings are read, for which the file has no place.
+        cutoff: Low-pass [Hz] of motion and torque; None takes the earlier result's, else lets the data choose.
         progress: Told the stage and the share done.
 
     Raises:
@@ -92,16 +83,31 @@ def validate(
     """
     if not recordings:
         raise ParameterError("validate: at least one recording is needed; got none")
-    model = friction or FrictionModel(DEFAULT_FRICTION, _couplings(robot, drives or {}))
-    settings = Settings(cutoff=cutoff, friction=model.columns, couplings=model.couplings)
-    late = np.array([(delays or {}).get(dof, 0.0) for dof in robot.dofs])
-    recordings = [aligned(recording, late) for recording in recordings]
+    earlier = earlier or EarlierResult()
+    model = earlier.friction or FrictionModel(DEFAULT_FRICTION, _couplings(robot, earlier.drives))
+    settings = Settings(
+        cutoff=cutoff or earlier.cutoff,
+        friction=model.columns,
+        couplings=model.couplings,
+        quasi_static=earlier.quasi_static,
+        torque_gains=tuple(earlier.torque_gains.get(dof, 1.0) for dof in robot.dofs),
+    )
+    late = np.array([earlier.delays.get(dof, 0.0) for dof in robot.dofs])
+    read = (recording.flipped(earlier.flip).with_time_scaled(earlier.time_scale) for recording in recordings)
+    recordings = [aligned(recording, late) for recording in read]
     choice = choose_cutoff(robot, recordings, settings, progress=lambda share: progress("cut-off", share))
     progress("predict", 0.0)
     motions = [make_motion(robot, recording, choice.cutoff) for recording in recordings]
-    columns = model.columns if friction else with_width(model.columns, coulomb_width(motions, USUAL_WIDTH).tolist())
-    regressor = build_regressor(robot, friction=columns, couplings=model.couplings)
-    parameters = parameters_with_drives(regressor, drives or {})
+    if earlier.friction is None:
+        settings = replace(settings, friction=with_widths(settings, motions, USUAL_WIDTH))
+    regressor = build_regressor(
+        robot,
+        friction=settings.friction,
+        couplings=settings.couplings,
+        quasi_static=earlier.quasi_static,
+        torque_gains=settings.torque_gains,
+    )
+    parameters = parameters_with_drives(regressor, earlier.drives)
     errors = [torque_error(regressor, parameters, [motion], choice.cutoff) for motion in motions]
     progress("predict", 1.0)
     return Validation(
@@ -133,47 +139,6 @@ def parameters_with_drives(regressor: Regressor, drives: Drives) -> Array:
                 )
             theta[place[owner, kind]] = value
     return theta
-
-
-def read_drives(path: Path) -> tuple[Drives, float | None]:
-    """Friction and armature of a ``result.json``, and the cut-off [Hz] that it was identified at.
-
-    Raises:
-        ParameterError: The file is not such a result.
-    """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        return content["friction"], content["cutoff"]["hz"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ParameterError(
-            f"{path}: wanted the result.json of an identification, with its 'friction' and 'cutoff'; {error!r}"
-        ) from error
-
-
-def read_delays(path: Path) -> Mapping[str, float]:
-    """By how much the torque was late, by joint [s], in a ``result.json``; empty where it says nothing of it.
-
-    Raises:
-        ParameterError: The file is not such a result.
-    """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        return {str(joint): float(late) for joint, late in content.get("delay", {}).get("seconds", {}).items()}
-    except (OSError, ValueError, AttributeError, TypeError) as error:
-        raise ParameterError(f"{path}: wanted the result.json of an identification; {error!r}") from error
-
-
-def read_friction(path: Path) -> FrictionModel | None:
-    """The friction columns and couplings of a ``result.json``; None for one that does not hold them.
-
-    Raises:
-        ParameterError: The file cannot be read, or its columns are not casysid's own.
-    """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        return model_from_json(content["friction_model"]) if "friction_model" in content else None
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ParameterError(f"{path}: its 'friction_model' is not that of an identification; {error!r}") from error
 
 
 def _couplings(robot: Robot, drives: Drives) -> tuple[Coupling, ...]:

@@ -32,7 +32,7 @@ from casysid.recording import Recording
 from casysid.report import render_report
 from casysid.robot import Robot
 from casysid.simulation import design_sinusoids
-from casysid.validation import read_drives, read_friction, validate
+from casysid.validation import read_earlier_result, validate
 from tests.simulated import bundled_robot
 
 RATE, CUTOFF, WIDTH, SEED_NOISE = 200.0, 10.0, 5e-3, 100
@@ -120,9 +120,9 @@ def test_the_choice_pays_on_unseen_data(result):
 def test_result_json_rebuilds_the_whole_model(result, tmp_path):
     notes = write_result(result, tmp_path)
     assert any("no place for shoulder.loaded_coulomb" in note for note in notes)
-    drives, cutoff = read_drives(tmp_path / "result.json")
+    earlier = read_earlier_result(tmp_path / "result.json")
     robot, unseen = Robot.from_file(tmp_path / "identified.urdf"), LOADED[1]
-    again = validate(robot, [unseen], drives=drives, friction=read_friction(tmp_path / "result.json"), cutoff=cutoff)
+    again = validate(robot, [unseen], earlier=earlier)
     assert again.total.relative == pytest.approx(result.held_out.relative, rel=1e-6)
     content = json.loads((tmp_path / "result.json").read_text())["friction_model"]
     assert content["chosen"][0]["joints"] == ["shoulder"]

@@ -150,6 +150,30 @@ def test_identify_warns_and_changes_nothing():
     np.testing.assert_array_equal(result.train_motions[0].tau, log.torque)
 
 
+@pytest.mark.parametrize(
+    ("changes", "flip"),
+    [
+        ({"tau": negate(1)}, "tau_elbow"),
+        ({"q": negate(1)}, "q_elbow"),
+        ({"q": negate(1), "tau": negate(1)}, "elbow"),
+        ({"tau": negate(slice(None))}, "tau"),
+    ],
+)
+def test_a_turned_sign_is_mended_by_what_the_warning_says(changes, flip):
+    robot, clean = bundled_robot("two_link.urdf"), clean_log("two_link.urdf")
+    (mistake,) = find_mistakes(robot, [changed(clean, **changes)])
+    assert mistake.flip == flip
+    assert mistake.sentence.endswith(f"by --flip {flip}")
+    settings = Settings(cutoff=6.0, delay=0.0, flip=(flip,))
+    found, wanted = (
+        identify(robot, changed(clean, **changes), settings),
+        identify(robot, clean, dataclasses.replace(settings, flip=())),
+    )
+    assert found.mistakes == ()
+    np.testing.assert_array_equal(found.parameters, wanted.parameters)
+    assert found.to_json()["flip"] == [flip]
+
+
 @pytest.mark.skipif(not REAL.is_dir(), reason="the real robots' logs are not there")
 @pytest.mark.filterwarnings("ignore::casysid.errors.CasysidWarning")  # of their model files
 @pytest.mark.parametrize("folder", LOGS)

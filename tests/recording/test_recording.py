@@ -241,3 +241,17 @@ def test_trimming_to_nothing_says_where_the_samples_are() -> None:
         RecordingError, match=r"no samples from 2\.0 s to 3\.0 s; the recording runs from 0 s to 0\.49 s"
     ):
         simple().trimmed(2.0, 3.0)
+
+
+@LAWS
+@given(recordings())
+def test_signs_turned_twice_are_as_before(recording):
+    first = recording.dofs[0]
+    for columns in (["tau"], [f"tau_{first}"], [f"q_{first}"], [first], ["tau", first]):
+        assert_same({name: getattr(recording.flipped(columns).flipped(columns), name) for name in FIELDS}, recording)
+    both = recording.flipped([first])
+    assert_same({name: getattr(recording.flipped([f"q_{first}", f"tau_{first}"]), name) for name in FIELDS}, both)
+    np.testing.assert_array_equal(both.torque[:, 0], -recording.torque[:, 0])
+    np.testing.assert_array_equal(both.position[:, 1:], recording.position[:, 1:])
+    with pytest.raises(ParameterError, match=r"no column v_nobody to turn; known are tau, tau_joint 0"):
+        recording.flipped(["v_nobody"])

@@ -1,5 +1,6 @@
 """A model file judged on recordings: its own parameters, and nothing else."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -15,7 +16,7 @@ from casysid.identification import Settings, identify
 from casysid.identification.output import write_result
 from casysid.robot import Robot
 from casysid.simulation import PlantSettings
-from casysid.validation import read_drives, validate
+from casysid.validation import EarlierResult, read_earlier_result, validate
 from tests.simulated import bundled_robot, simulated_run
 
 CUTOFF = 20.0
@@ -51,19 +52,31 @@ def test_the_files_own_parameters_are_judged(recordings):
 
 def test_an_identified_file_needs_its_result_for_what_urdf_cannot_hold(recordings, identified):
     robot = Robot.from_file(identified / "identified.urdf")
-    drives, cutoff = read_drives(identified / "result.json")
+    earlier = read_earlier_result(identified / "result.json")
     alone = validate(robot, recordings[1:], cutoff=CUTOFF).total.relative
-    whole = validate(robot, recordings[1:], drives=drives, cutoff=cutoff).total.relative
-    assert cutoff == CUTOFF
+    whole = validate(robot, recordings[1:], earlier=earlier).total.relative
+    assert earlier.cutoff == CUTOFF
     assert whole < alone
     assert whole < 0.05
 
 
+def test_signs_clock_and_gains_of_the_result_are_those_of_the_identification(recordings, identified):
+    robot, earlier = Robot.from_file(identified / "identified.urdf"), read_earlier_result(identified / "result.json")
+    plain = validate(robot, recordings[1:], earlier=earlier).total.relative
+    gains = dict(zip(robot.dofs, (0.8, 1.25), strict=True))
+    recording = recordings[1]
+    read = dataclasses.replace(
+        recording.flipped([f"tau_{robot.dofs[0]}"]).with_time_scaled(0.5), torque=recording.torque * [-0.8, 1.25]
+    )
+    earlier = dataclasses.replace(earlier, flip=(f"tau_{robot.dofs[0]}",), time_scale=2.0, torque_gains=gains)
+    assert validate(robot, [read], earlier=earlier).total.relative == pytest.approx(plain, rel=0.05)
+
+
 def test_another_robots_result_is_refused(recordings, identified):
-    drives, _ = read_drives(identified / "result.json")
-    other = {f"left_{owner}": kinds for owner, kinds in drives.items()}
+    drives = read_earlier_result(identified / "result.json").drives
+    other = EarlierResult(drives={f"left_{owner}": kinds for owner, kinds in drives.items()})
     with pytest.raises(ParameterError, match="Is this the result of another robot"):
-        validate(bundled_robot("two_link"), recordings, drives=other, cutoff=CUTOFF)
+        validate(bundled_robot("two_link"), recordings, earlier=other, cutoff=CUTOFF)
     with pytest.raises(ParameterError, match="at least one recording"):
         validate(bundled_robot("two_link"), [])
 
@@ -73,9 +86,9 @@ def test_a_file_that_is_no_result_is_refused(tmp_path, text):
     path = tmp_path / "result.json"
     path.write_text(text)
     with pytest.raises(ParameterError, match=r"wanted the result\.json of an identification"):
-        read_drives(path)
+        read_earlier_result(path)
     with pytest.raises(ParameterError, match=r"wanted the result\.json of an identification"):
-        read_drives(tmp_path / "absent.json")
+        read_earlier_result(tmp_path / "absent.json")
 
 
 def test_validate_writes_json_and_prints_a_table(recordings, identified, tmp_path):
