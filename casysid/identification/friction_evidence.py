@@ -4,7 +4,8 @@ A candidate is a few columns that act on the torque of one joint (a coupling: of
 its own joints on stretches of time that were left out of the fit: in each stretch the residual energy with it is held
 against that without it, and the logarithms of these ratios say how large the gain is and how sure. Ratios, because the
 energy of a recording sits in few stretches, and what helps in these alone is chance as often as friction. The best of
-those that pass joins the model; then all are asked again, until none passes.
+those that pass joins the model; then all are asked again, until none passes. Where there are several recordings, it has
+to help in each of them that was left out whole: what takes up the habits of one motion does not help in another.
 
 The columns that are in the model anyway are eliminated once for each fold; after that a candidate costs next to
 nothing, and all of them together little more than one fit.
@@ -83,6 +84,7 @@ class Evidence:
         moments: Of all columns.
         shifted: The same relative to the prior.
         partitions: Ways to cut the blocks into stretches, each a list of block indices.
+        recordings: The blocks of each whole recording, where there are several, but too few to be the stretches.
         physics: Rows ``A`` of ``A θ ≥ 0``: what friction cannot be otherwise, shape (r, p).
         prior: ``θ0``, shape (p,).
     """
@@ -90,6 +92,7 @@ class Evidence:
     moments: Moments
     shifted: Moments
     partitions: Sequence[Sequence[Indices]]
+    recordings: Sequence[Indices]
     physics: Array
     prior: Array
 
@@ -97,13 +100,17 @@ class Evidence:
 def build_evidence(moments: Moments, prior: Array, physics: Array, recordings: int = 1) -> Evidence:
     """Evidence of moments whose blocks belong to so many recordings of equally many blocks each.
 
-    With enough recordings whole ones are left out, else contiguous stretches of time.
+    With enough recordings whole ones are left out, else contiguous stretches of time and then whole recordings.
     """
-    units = np.arange(moments.blocks)[:, None]
-    if recordings >= FEWEST_STRETCHES and moments.blocks % recordings == 0:
-        units = np.arange(moments.blocks).reshape(recordings, -1)
+    units, whole = np.arange(moments.blocks)[:, None], []
+    if recordings > 1 and moments.blocks % recordings == 0:
+        by_recording = units.reshape(recordings, -1)
+        if recordings >= FEWEST_STRETCHES:
+            units = by_recording
+        else:
+            whole = list(by_recording)
     partitions = [[units[fold].ravel() for fold in contiguous_folds(len(units), folds)] for folds in PARTITIONS]
-    return Evidence(moments, moments.shifted(prior), partitions, physics, prior)
+    return Evidence(moments, moments.shifted(prior), partitions, whole, physics, prior)
 
 
 def choose_candidates(evidence: Evidence, base: Sequence[int], candidates: Sequence[Candidate]) -> tuple[Finding, ...]:
@@ -157,7 +164,10 @@ def _best(
     weights = fit.noise_std**-2.0
     pull = fit.metric - model.pooled(weights).xx
     strength = fit.diagnostics.get("strength", 0.0)
-    errors = [HeldOutErrors(evidence.shifted, base, weights, pull, strength, folds) for folds in evidence.partitions]
+    errors, by_recording = (
+        [HeldOutErrors(evidence.shifted, base, weights, pull, strength, stretches) for stretches in several]
+        for several in (evidence.partitions, [evidence.recordings] if evidence.recordings else [])
+    )
     gains = [
         min(_sure_gain(one, candidate, FAMILIAR if candidate.family in familiar else STANDARD_ERRORS) for one in errors)
         for candidate in candidates
@@ -166,7 +176,11 @@ def _best(
         if not gains[k] > 0.0:
             break
         candidate = candidates[int(k)]
-        if all(_harms_no_other(one, candidate) for one in errors) and _is_physical(errors[0], candidate, evidence):
+        if (
+            all(_harms_no_other(one, candidate) for one in errors)
+            and all(_helps_everywhere(one, candidate) for one in by_recording)
+            and _is_physical(errors[0], candidate, evidence)
+        ):
             return _finding(errors[0], candidate)
     return None
 
@@ -184,6 +198,12 @@ def _sure_gain(errors: HeldOutErrors, candidate: Candidate, standard_errors: flo
     if mean < standard_errors * error or after.sum() > (1.0 - wanted) * before.sum():
         return 0.0
     return mean - 0.5 * SMALLEST_GAIN * more
+
+
+def _helps_everywhere(errors: HeldOutErrors, candidate: Candidate) -> bool:
+    """Whether the torque of its own joints is predicted better in every stretch."""
+    before, after = errors.energies(candidate.columns, candidate.joints)
+    return bool((after <= before).all())
 
 
 def _harms_no_other(errors: HeldOutErrors, candidate: Candidate) -> bool:

@@ -95,6 +95,23 @@ def test_whole_recordings_are_left_out_when_there_are_enough():
     assert [fold.tolist() for fold in by_recording.partitions[1]] == [[2 * k, 2 * k + 1] for k in range(10)]
 
 
+def test_what_helps_within_recordings_but_not_from_one_to_the_other_stays_out():
+    x, y = regression(11)
+    half = ROWS // 2
+    x[:half, KNOWN + 2] *= 0.5
+    y = y + np.where(np.arange(ROWS) < half, 1.8, 0.7) * x[:, KNOWN + 2]  # each fits itself, and the other overmuch
+    moments = Moments.from_rows(x, y, blocks=BLOCKS)
+    one, two = (build_evidence(moments, np.zeros(x.shape[1]), NO_LAWS, recordings=count) for count in (1, 2))
+    assert [finding.candidate.name for finding in choose_candidates(one, range(KNOWN), candidates())] == ["c2"]
+    assert choose_candidates(two, range(KNOWN), candidates()) == ()
+
+
+def test_what_is_true_of_every_recording_is_found_in_two():
+    x, y = regression(1, [(3, 0.8)])
+    evidence = build_evidence(Moments.from_rows(x, y, blocks=BLOCKS), np.zeros(x.shape[1]), NO_LAWS, recordings=2)
+    assert [finding.candidate.name for finding in choose_candidates(evidence, range(KNOWN), candidates())] == ["c3"]
+
+
 @pytest.mark.parametrize("columns", [(), (KNOWN + 1,), (KNOWN + 1, KNOWN + 4)])
 def test_held_out_energies_are_those_of_fits_one_by_one(columns):
     rng = np.random.default_rng(7)
