@@ -46,7 +46,7 @@ def compare(
     time_scale: TimeScaleOption = None,
     delay: DelayOption = "auto",
     coupling: CouplingOption = None,
-    friction: FrictionOption = FrictionWord.PLAIN,
+    friction: FrictionOption = FrictionWord.AUTO,
     gravity: GravityOption = None,
     lock: LockOption = None,
     floating_base: FloatingOption = False,

@@ -55,7 +55,7 @@ def identify(
     noise_position: PositionNoiseOption = None,
     noise_velocity: VelocityNoiseOption = None,
     noise_acceleration: AccelerationNoiseOption = None,
-    friction: FrictionOption = FrictionWord.PLAIN,
+    friction: FrictionOption = FrictionWord.AUTO,
     gravity: GravityOption = None,
     lock: LockOption = None,
     floating_base: FloatingOption = False,

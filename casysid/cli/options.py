@@ -154,7 +154,7 @@ def make_settings(
     time_scale: float | None = None,
     delay: str = "auto",
     input_noise: NoiseLevels | None = None,
-    friction: FrictionWord = FrictionWord.PLAIN,
+    friction: FrictionWord = FrictionWord.AUTO,
     flip: list[str] | None = None,
 ) -> Settings:
     """Settings from the command line's words."""

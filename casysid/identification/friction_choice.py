@@ -86,7 +86,7 @@ def choose_friction(
     relative_width: float | Array,
     moving_only: Mask | bool = False,
 ) -> FrictionChoice:
-    """Friction columns and couplings that cross-validation over stretches of time asks for.
+    """Friction columns and couplings that cross-validation over stretches of time asks for; none without time.
 
     Args:
         robot: The robot.
@@ -96,6 +96,8 @@ def choose_friction(
         relative_width: Of the smooth sign, in root mean square velocities.
         moving_only: As for :func:`~casysid.identification.problem.build_problem`.
     """
+    if cutoff is None:
+        return FrictionChoice(_with_friction(settings, ()))
     motions = make_motions(robot, recordings, cutoff, settings, moving_only=moving_only, quick=True)
     base = regressor_for(robot, motions, settings, relative_width)
     speed = np.sqrt(np.mean([np.mean(motion.v**2, axis=0) for motion in motions], axis=0))

@@ -6,6 +6,7 @@ import json
 import os
 from pathlib import Path
 
+from casysid.identification.plain_friction import nearest_plain_friction
 from casysid.identification.result import JOINT_KINDS, IdentificationResult, without_infinities
 from casysid.identification.verdict import judge
 from casysid.moments import write_moments
@@ -50,24 +51,29 @@ def _write_model(result: IdentificationResult, directory: Path, export_inconsist
     if not (result.is_physically_consistent or export_inconsistent):
         path.unlink(missing_ok=True)
         return (f"{path.name} is withheld because the parameters are not physically consistent.",)
+    homeless = _homeless(result)
+    plain = nearest_plain_friction(result.regressor.parameters, result.parameters, result.moments, homeless)
     written = write_robot(
         result.robot,
         path,
         result.inertial_parameters.ravel(),
-        damping=result.drive_vector("viscous"),
-        dry_friction=result.drive_vector("coulomb"),
+        damping=plain["viscous"],
+        dry_friction=plain["coulomb"],
         armature=result.drive_vector("armature"),
     )
-    return (*written.notes, *_friction_notes(result, path))
+    if not homeless:
+        return written.notes
+    note = (
+        f"{path.name} has no place for {', '.join(homeless)}: they are in result.json, under friction; the file's "
+        "viscous and Coulomb friction are those that come nearest to the whole."
+    )
+    return (*written.notes, note)
 
 
-def _friction_notes(result: IdentificationResult, path: Path) -> list[str]:
-    """What of friction a robot file has no place for, and how it was left out."""
-    homeless = [
+def _homeless(result: IdentificationResult) -> list[str]:
+    """Names of the drive columns that a robot file has no place for."""
+    return [
         parameter.name
         for parameter in result.regressor.parameters[10 * len(result.robot.links) :]
         if parameter.kind not in JOINT_KINDS or parameter.owner not in result.robot.dofs
     ]
-    if not homeless:
-        return []
-    return [f"{path.name} has no place for {', '.join(homeless)}: they are in result.json, under friction."]

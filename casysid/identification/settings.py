@@ -26,7 +26,8 @@ class Settings:
         cutoff: Low-pass cut-off [Hz]; None lets the data choose.
         delay: By how much the torque's time stamps are late against the positions' [s]; None takes it from the data.
         friction: Kinds of friction and drive columns of every joint.
-        choose_friction: Whether the data may add kinds of friction, joint by joint, and couplings of neighbours.
+        choose_friction: Whether the data may add kinds of friction, joint by joint, and couplings of neighbours; only
+            with time stamps.
         coulomb_width: Velocity within which Coulomb's smooth sign turns [rad/s, m/s]; None takes it from the velocity's
             noise.
         couplings: Transmissions that link joints, such as a wrist driven by two motors.
@@ -45,7 +46,7 @@ class Settings:
     cutoff: float | None = None
     delay: float | None = None
     friction: tuple[FrictionColumn, ...] = DEFAULT_FRICTION
-    choose_friction: bool = False
+    choose_friction: bool = True
     coulomb_width: float | None = None
     couplings: tuple[Coupling, ...] = ()
     time_scale: float | None = None

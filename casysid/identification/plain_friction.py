@@ -1,0 +1,57 @@
+"""What a robot file can hold of a richer friction: viscous and Coulomb coefficients that come nearest to its torque."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from casysid.arrays import Array
+from casysid.dynamics import Armature, Coulomb, Offset, Parameter, Spring, Viscous
+from casysid.moments import Moments
+
+PLAIN = (Viscous.kind, Coulomb.kind)
+
+
+def nearest_plain_friction(
+    columns: Sequence[Parameter], theta: Array, moments: Moments, homeless: Sequence[str]
+) -> dict[str, Array]:
+    """Viscous and Coulomb coefficients by degree of freedom, shape (nv,) each, that stand for other friction too.
+
+    On the fitted motions, the torque of each joint's friction with its other columns is nearest to that of these
+    coefficients and an offset. Joints without other columns keep theirs; armature and springs are no friction.
+
+    Args:
+        columns: The regressor's.
+        theta: Their values, shape (p,).
+        moments: Of the fitted motions.
+        homeless: Names of the columns that a robot file has no place for.
+    """
+    places = {column.name: k for k, column in enumerate(columns)}
+    kinds = {column.name: column.kind for column in columns}
+    found = {kind: np.zeros(len(moments.joints)) for kind in PLAIN}
+    for joint, dof in enumerate(moments.joints):
+        gram = moments.gram[:, joint, :-1, :-1].sum(axis=0)
+        own = {kind: places[name] for kind in PLAIN if (name := f"{dof}.{kind}") in places}
+        other = [places[name] for name in homeless if kinds[name] not in (Armature.kind, Spring.kind)]
+        other = [column for column in other if gram[column, column] > 0.0]
+        values = {kind: float(theta[column]) for kind, column in own.items()}
+        if own and other:
+            offset = [places[name] for name in (f"{dof}.{Offset.kind}",) if name in places]
+            values = dict(zip(own, _nearest(gram, [*own.values()], offset, other, theta), strict=True))
+        for kind, value in values.items():
+            found[kind][joint] = value
+    return found
+
+
+def _nearest(gram: Array, own: list[int], offset: list[int], other: list[int], theta: Array) -> Array:
+    """Non-negative coefficients of ``own`` whose torque with an offset is nearest to that of ``own`` and ``other``."""
+    kept = [*own, *offset, *other]
+    values, vectors = np.linalg.eigh(gram[np.ix_(kept, kept)])
+    root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    target = theta[kept].copy()
+    target[len(own) : len(own) + len(offset)] = 0.0
+    free = len(own) + len(offset)
+    lower = np.append(np.zeros(len(own)), np.full(len(offset), -np.inf))
+    return np.asarray(lsq_linear(root[:, :free], root @ target, bounds=(lower, np.inf)).x[: len(own)])
