@@ -56,7 +56,7 @@ def accuracy(robots: Sequence[str], seeds: Sequence[int], duration: float, tick:
                     trial = make_trial(robot, seed, noise, highest, duration=duration)
                     error, cutoff = best_rival(trial, highest)
                     result = identify(trial.robot, trial.recording, EIV)
-                    ours.append(trial.error(result.parameters))
+                    ours.append(trial.error(result.parameters, result.regressor))
                     rival.append(error)
                     cutoffs.append([cutoff, result.cutoff.cutoff])
                     tick()

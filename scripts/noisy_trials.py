@@ -61,9 +61,9 @@ class Trial:
     unseen: Reference
     torque: Array
 
-    def error(self, parameters: Array) -> float:
+    def error(self, parameters: Array, regressor: Regressor | None = None) -> float:
         """Torque error of parameters on the held-out motion, against the truth, over the size of its changes."""
-        predicted = self.regressor.predict(parameters, self.unseen.q, self.unseen.v, self.unseen.a)
+        predicted = (regressor or self.regressor).predict(parameters, self.unseen.q, self.unseen.v, self.unseen.a)
         return float(np.linalg.norm(predicted - self.torque) / np.linalg.norm(self.torque - self.torque.mean(axis=0)))
 
 
