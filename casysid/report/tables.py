@@ -6,10 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from casysid.dynamics.friction import force_unit, joint_directions
 from casysid.identification import IdentificationResult
 from casysid.identification.mistakes import Mistake
 from casysid.identification.result import JOINT_KINDS
 from casysid.inertia import KINDS
+from casysid.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def error_table(result: IdentificationResult) -> Table:
         )
         for k, dof in enumerate(result.robot.dofs)
     ]
-    return Table(("joint", "fitted", "held out", "model file", "RMS error [N m]"), tuple(rows))
+    return Table(("joint", "fitted", "held out", "model file", f"RMS error [{torque_units(result.robot)}]"), tuple(rows))
 
 
 def mistake_table(mistakes: Sequence[Mistake]) -> Table:
@@ -80,6 +82,11 @@ def mistake_table(mistakes: Sequence[Mistake]) -> Table:
         for one in mistakes
     )
     return Table(("what looks wrong", "explained as logged", "explained if so corrected"), rows)
+
+
+def torque_units(robot: Robot) -> str:
+    """Units of a robot's torques: N m, N, or both."""
+    return ", ".join(sorted({force_unit(direction) for direction in joint_directions(robot).values()}, reverse=True))
 
 
 def link_table(result: IdentificationResult) -> Table:

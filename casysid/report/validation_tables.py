@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from casysid.report.tables import Table, number, percent
+from casysid.report.tables import Table, number, percent, torque_units
 from casysid.validation import Rehearsal, Validation
 
 WORDS = {"file": "the model file's", "identified": "identified", "true": "true"}
@@ -20,7 +20,7 @@ def validation_tables(validation: Validation) -> list[tuple[str, Table]]:
     ]
     cutoff = validation.cutoff.cutoff
     seen = "as logged" if cutoff is None else f"below {cutoff:.3g} Hz"
-    header = ("joint", seen, "unfiltered torque", "RMS error [N m, N]")
+    header = ("joint", seen, "unfiltered torque", f"RMS error [{torque_units(validation.robot)}]")
     tables = [(f"Torque error of {validation.robot.source.name}", Table(header, tuple(rows)))]
     if len(validation.by_recording) > 1:
         each = tuple(
