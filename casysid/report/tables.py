@@ -72,7 +72,8 @@ def error_table(result: IdentificationResult) -> Table:
         )
         for k, dof in enumerate(result.robot.dofs)
     ]
-    return Table(("joint", "fitted", "held out", "model file", f"RMS error [{torque_units(result.robot)}]"), tuple(rows))
+    header = ("joint", "fitted", "held out", "model file", f"RMS error [{torque_units(result.robot)}]")
+    return Table(header, tuple(rows))
 
 
 def mistake_table(mistakes: Sequence[Mistake]) -> Table:
