@@ -10,6 +10,7 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.identification import IdentificationResult, torque_band
+from casysid.report.tables import torque_unit
 from casysid.signals import Motion
 
 MEASURED, PREDICTED, RESIDUAL = "#9aa5b1", "#1f6feb", "#d1495b"
@@ -57,22 +58,11 @@ def torque_figure(result: IdentificationResult) -> Any:
         ax.plot(motion.time[pick], predicted[pick, k], color=PREDICTED, linewidth=1.0, label="predicted")
         ax.plot(motion.time[pick], (measured - predicted)[pick, k], color=RESIDUAL, linewidth=0.7, label="difference")
         _limit(ax, measured[:, k], predicted[:, k])
-        ax.set_ylabel(f"{dof}\n{torque_unit(result, k)}", fontsize=8)
+        ax.set_ylabel(f"{dof}\n{torque_unit(result.robot, k)}", fontsize=8)
     axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=4, frameon=False, fontsize=8)
     axes[-1].set_xlabel("time [s]")
     canvas.align_ylabels(axes)
     return canvas
-
-
-def torque_unit(result: IdentificationResult, dof: int) -> str:
-    """Unit of a degree of freedom's torque: that of its offset column."""
-    name = result.robot.dofs[dof]
-    units = [
-        one.unit
-        for one in result.regressor.parameters
-        if (one.owner, one.kind) in ((name, "offset"), (name, "coulomb"))
-    ]
-    return units[0] if units else "N m"
 
 
 def cutoff_figure(result: IdentificationResult) -> Any:

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from casysid.report.pictures import MEASURED, MOST_POINTS, PREDICTED, RESIDUAL, figure, torque_unit
+from casysid.report.pictures import MEASURED, MOST_POINTS, PREDICTED, RESIDUAL, figure
+from casysid.report.tables import torque_unit
 from casysid.validation import Rehearsal
 from casysid.validation.tracking import position_error
 
@@ -50,7 +51,7 @@ def rehearsed_torque_figure(rehearsal: Rehearsal) -> Any:
         ax.plot(time, measured[shown, k], color=MEASURED, linewidth=2.2, label="measured")
         ax.plot(time, file[shown, k], color=RESIDUAL, linewidth=0.8, label="predicted by the model file")
         ax.plot(time, predicted[shown, k], color=PREDICTED, linewidth=1.0, label="predicted by identified parameters")
-        ax.set_ylabel(f"{dof}\n{torque_unit(result, k)}", fontsize=8)
+        ax.set_ylabel(f"{dof}\n{torque_unit(result.robot, k)}", fontsize=8)
     _legend(axes[0])
     axes[-1].set_xlabel("time [s], motion never fitted")
     return canvas

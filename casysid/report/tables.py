@@ -85,9 +85,15 @@ def mistake_table(mistakes: Sequence[Mistake]) -> Table:
     return Table(("what looks wrong", "explained as logged", "explained if so corrected"), rows)
 
 
+def torque_unit(robot: Robot, dof: int) -> str:
+    """Unit of a degree of freedom's torque: N m or N; of a free-flyer's, which has no drive, N m."""
+    direction = joint_directions(robot).get(dof)
+    return "N m" if direction is None else force_unit(direction)
+
+
 def torque_units(robot: Robot) -> str:
-    """Units of a robot's torques: N m, N, or both."""
-    return ", ".join(sorted({force_unit(direction) for direction in joint_directions(robot).values()}, reverse=True))
+    """The units of a robot's torques, with commas between them."""
+    return ", ".join(sorted({torque_unit(robot, dof) for dof in range(robot.nv)}, reverse=True))
 
 
 def link_table(result: IdentificationResult) -> Table:
