@@ -1,9 +1,10 @@
 """Held-out torque error on logs of real robots, every method with its defaults, as a table and as JSON.
 
-    python scripts/evaluate_real_robots.py --data DIR [--methods ols,wls,ridge] [--robots emps,...] [--json FILE]
+    python scripts/evaluate_real_robots.py --data DIR [--methods all] [--robots emps,...] [--json FILE]
 
-DIR holds a folder per robot with its URDF and recordings. What is known of a robot beforehand, such as a wrist whose
-motors drive two joints, is declared in the table below; nothing else is told.
+DIR holds a folder per robot with its URDF and recordings; nothing is told. With ``--friction plain``, what is known of
+a robot beforehand, such as a wrist whose motors drive two joints, is declared in the table below. Under the table
+stands what the data settled for each robot.
 """
 
 from __future__ import annotations
@@ -15,16 +16,20 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
 from casysid.dynamics import Coupling
-from casysid.estimation import estimator_by_name
-from casysid.identification import Preparation, Settings, compare, prepare
+from casysid.estimation import ESTIMATORS, estimator_by_name
+from casysid.identification import IdentificationResult, Preparation, Settings, compare, prepare
 from casysid.inertia import Consistency
 from casysid.recording import read_recording
 from casysid.robot import Robot
+
+WIDTH = 190
+"""Columns of text that the table takes."""
 
 
 @dataclass(frozen=True)
@@ -80,42 +85,55 @@ def prepare_trial(data: Path, trial: Trial, settings: Settings) -> Preparation:
     return prepare(robot, fitted, settings, held_out=held_out)
 
 
+def settled(preparation: Preparation, result: IdentificationResult) -> list[str]:
+    """What the data decided on one robot, in sentences: friction, delay, prior, noise."""
+    chosen = [one.sentence for one in preparation.friction.chosen] or ["nothing beyond viscous and Coulomb"]
+    figures = result.estimate.diagnostics
+    lines = [f"friction: {'; '.join(chosen)}", f"delay: {preparation.delay.reason}"]
+    if "effective_parameters" in figures:
+        decided, strength = figures["effective_parameters"], figures["strength"]
+        lines.append(
+            f"prior: strength {strength:.1e}; the data decide {decided:.1f} of {result.estimate.rank} directions"
+        )
+    if "noise_share_of_weakest_direction" in figures:
+        share, removed = figures["noise_share_of_weakest_direction"], figures["directions_too_noisy"]
+        lines.append(f"noise: {share:.2g} of the weakest direction's energy; {removed:.0f} directions limited")
+    return lines
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
-    parser.add_argument("--methods", default="ols,wls,ridge")
+    parser.add_argument("--methods", default="all", help="names with commas between them, or all")
+    parser.add_argument("--judged", default="eiv", help="the method that is held against the best of the others")
     parser.add_argument("--consistency", choices=["none", "inertia", "full"], default="full")
     parser.add_argument("--robots", default=",".join(trial.folder for trial in TRIALS))
-    parser.add_argument("--friction", choices=["plain", "auto"], default="plain", help="auto: no coupling is declared")
+    parser.add_argument("--friction", choices=["plain", "auto"], default="auto")
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
-    methods = [estimator_by_name(name) for name in arguments.methods.split(",")]
-    chosen = arguments.robots.split(",")
+    names = [kind.name for kind in ESTIMATORS] if arguments.methods == "all" else arguments.methods.split(",")
+    methods, chosen = [estimator_by_name(name) for name in names], arguments.robots.split(",")
     consistency = None if arguments.consistency == "none" else Consistency(arguments.consistency)
-    console, figures = Console(), {}
-    table = Table(title=f"held-out relative torque error, consistency {arguments.consistency}")
-    for header in (
-        "robot",
-        "plain WLS, tuned",
-        "cut-off [Hz]",
-        *(method.name for method in methods),
-        "best / plain",
-        "model file",
-        "seconds",
-    ):
+    console, figures = Console(width=WIDTH), {}
+    table = Table(
+        title=f"held-out relative torque error, consistency {arguments.consistency}, friction {arguments.friction}"
+    )
+    for header in ("robot", "plain WLS, tuned", "Hz", *names, f"{arguments.judged} / best other", "file", "CPU [s]"):
         table.add_column(header, justify="left" if header == "robot" else "right")
     for trial in track([one for one in TRIALS if one.folder in chosen], console=Console(stderr=True), transient=True):
-        started = time.perf_counter()
-        auto = arguments.friction == "auto"
+        started, auto = time.process_time(), arguments.friction == "auto"
         settings = Settings(consistency=consistency, choose_friction=auto, couplings=() if auto else trial.couplings)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             preparation = prepare_trial(arguments.data, trial, settings)
+            prepared = time.process_time() - started
             comparison = compare(preparation, methods, settings)
         results, cutoff = comparison.results, preparation.cutoff.cutoff
-        seconds = time.perf_counter() - started
         errors = {name: result.held_out.relative for name, result in results.items()}
-        best, any_result = min(errors.values()), next(iter(results.values()))
+        others = [error for name, error in errors.items() if name != arguments.judged]
+        judged = results.get(arguments.judged)
+        ratio = errors[arguments.judged] / min(others) if judged and others else float("nan")
+        shown = judged or next(iter(results.values()))
         figures[trial.folder] = {
             "anchor": trial.anchor,
             "cutoff": cutoff,
@@ -123,23 +141,28 @@ def main() -> None:
             "unfiltered": {name: result.held_out.relative_unfiltered for name, result in results.items()},
             "unconstrained": {name: result.unconstrained.relative for name, result in results.items()},
             "consistent": {name: result.is_physically_consistent for name, result in results.items()},
-            "file": any_result.file.relative,
-            "friction": [one.sentence for one in preparation.friction.chosen],
-            "seconds": seconds,
+            "failed": dict(comparison.failures),
+            "judged_over_best_other": ratio,
+            "file": shown.file.relative,
+            "settled": settled(preparation, shown),
+            "cpu_seconds": {"prepare": prepared, "all": time.process_time() - started},
         }
         table.add_row(
             trial.folder,
             f"{trial.anchor:.3f}",
             f"{cutoff:.3g}",
-            *(f"{errors[method.name]:.4f}" if method.name in errors else "–" for method in methods),
-            f"{best / trial.anchor:.2f}",
-            f"{any_result.file.relative:.3f}",
-            f"{seconds:.1f}",
+            *(f"{errors[name]:.4f}" if name in errors else "–" for name in names),
+            f"{ratio:.3f}",
+            f"{shown.file.relative:.3f}",
+            f"{prepared:.1f}",
         )
+    together = {name: [content["held_out"].get(name, np.nan) for content in figures.values()] for name in names}
+    means = [f"{np.exp(np.mean(np.log(errors))):.4f}" for errors in together.values()]
+    table.add_row("geometric mean", "", "", *means, "", "", "")
     console.print(table)
     for folder, content in figures.items():
-        for sentence in content["friction"]:
-            console.print(f"{folder}: {sentence}", markup=False, highlight=False)
+        for sentence in content["settled"]:
+            console.print(f"{folder}: {sentence}", markup=False, highlight=False, soft_wrap=True)
     if arguments.json:
         arguments.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
 
