@@ -1,6 +1,6 @@
 """How often kinds of friction are recognised in simulated recordings, and how often one is chosen that is not there.
 
-    python scripts/measure_friction_choice.py [--robot head] [--seeds 5] [--share 0.1] [--json FILE]
+    python scripts/measure_friction_choice.py [--robot head] [--seeds 5] [--recordings 2] [--share 0.1] [--json FILE]
 
 Every trial gives one joint, a different one for each seed, one kind of friction more than viscous, Coulomb, offset and
 armature. Its torque is a share of the joint's whole; on top comes noise of the torque, part of it slow.
@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.signal import lfilter
 
+from casysid.arrays import Array
 from casysid.bundled import find_model
 from casysid.dynamics import (
     DEFAULT_FRICTION,
@@ -26,6 +27,7 @@ from casysid.dynamics import (
     FrictionColumn,
     LoadedCoulomb,
     PowerViscous,
+    Regressor,
     Spring,
     Stribeck,
     build_regressor,
@@ -35,7 +37,7 @@ from casysid.identification import Settings
 from casysid.identification.friction_choice import FrictionChoice, choose_friction
 from casysid.recording import Recording
 from casysid.robot import Robot
-from casysid.simulation import design_sinusoids
+from casysid.simulation import Reference, design_sinusoids
 
 KINDS = (
     "plain", "stribeck", "power_viscous", "viscous_asymmetry", "stiffness", "loaded_coulomb", "coupling",
@@ -58,38 +60,56 @@ def column_of(kind: str, joint: str, speed: float) -> FrictionColumn:
     return LoadedCoulomb(WIDTH, (joint,))
 
 
-def simulate(robot: Robot, kind: str, seed: int, share: float) -> tuple[Recording, str]:
-    """A recording, and the joint that has the kind."""
-    rng = np.random.default_rng(seed)
+def simulate(
+    robot: Robot, kind: str, seed: int, share: float, recordings: int = 1
+) -> tuple[tuple[Recording, ...], str]:
+    """Recordings of one machine, and the joint that has the kind."""
     samples = np.arange(int(DURATION * RATE)) / RATE
-    motion = design_sinusoids(robot, duration=DURATION, seed=seed, band=(0.1, 1.0)).sample(samples)
+    motions = [
+        design_sinusoids(robot, duration=DURATION, seed=1000 * k + seed, band=(0.1, 1.0)).sample(samples)
+        for k in range(recordings)
+    ]
     dof = seed % robot.nv
     joint, neighbour = robot.dofs[dof], robot.dofs[dof - 1 if dof else 1]
     friction, couplings = with_width(DEFAULT_FRICTION, WIDTH), []
     if kind == "coupling":
         couplings = [Coupling((neighbour, joint) if dof else (joint, neighbour), (1.0, 1.0), ("viscous", "coulomb"))]
     elif kind != "plain":
-        friction = (*friction, column_of(kind, joint, float(motion.v[:, dof].std())))
+        friction = (*friction, column_of(kind, joint, float(motions[0].v[:, dof].std())))
     regressor = build_regressor(robot, friction, couplings)
+    theta = coefficients(regressor, motions[0], dof, share)
+    rng = np.random.default_rng(seed)
+    return tuple(record(regressor, theta, motion, samples, rng) for motion in motions), joint
+
+
+def coefficients(regressor: Regressor, motion: Reference, dof: int, share: float) -> Array:
+    """The machine's parameters: ordinary friction in proportion to the rigid torque, and the kind's share of it."""
+    robot, state = regressor.robot, (motion.q, motion.v, motion.a)
     base = build_regressor(robot, with_width(DEFAULT_FRICTION, WIDTH))
-    state = motion.q, motion.v, motion.a
     theta, count = np.array(regressor.prior), len(base.names)
-    rigid = base.predict(np.where(np.arange(count) < robot.inertial_parameters.size, base.prior, 0.0), *state).std(
-        axis=0
-    )
+    bodies = np.where(np.arange(count) < robot.inertial_parameters.size, base.prior, 0.0)
+    rigid = base.predict(bodies, *state).std(axis=0)
     places = {name: k for k, name in enumerate(regressor.names)}
     for k, name in enumerate(robot.dofs):
         theta[places[f"{name}.viscous"]] = 0.3 * rigid[k] / motion.v[:, k].std()
         theta[places[f"{name}.coulomb"]] = 0.15 * rigid[k]
     if len(theta) > count:
-        size = regressor.evaluate(*state)[:, dof, count:].std(axis=0)
-        theta[count:] = share * rigid[dof] / size
-    torque = regressor.predict(theta, *state)
+        theta[count:] = share * rigid[dof] / regressor.evaluate(*state)[:, dof, count:].std(axis=0)
+    return theta
+
+
+def record(regressor: Regressor, theta: Array, motion: Reference, time: Array, rng: np.random.Generator) -> Recording:
+    """The motion with noise, and its torque with noise of which a part is slow."""
+    torque = regressor.predict(theta, motion.q, motion.v, motion.a)
     slow = np.sqrt(1.0 - MEMORY**2) * lfilter([1.0], [1.0, -MEMORY], rng.normal(size=torque.shape), axis=0)
     noise = SLOW_NOISE * slow + FAST_NOISE * rng.normal(size=torque.shape)
-    position = motion.channels + POSITION_NOISE * rng.normal(size=motion.channels.shape)
-    measured = torque + noise * torque.std(axis=0)
-    return Recording(channels=robot.channels, dofs=robot.dofs, time=samples, position=position, torque=measured), joint
+    return Recording(
+        channels=regressor.robot.channels,
+        dofs=regressor.robot.dofs,
+        time=time,
+        position=motion.channels + POSITION_NOISE * rng.normal(size=motion.channels.shape),
+        torque=torque + noise * torque.std(axis=0),
+    )
 
 
 def judge(choice: FrictionChoice, kind: str, joint: str) -> tuple[bool, int]:
@@ -102,6 +122,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--robot", default="head")
     parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--recordings", type=int, default=1, help="Of the same machine, each with its own motion.")
     parser.add_argument("--share", type=float, default=0.1, help="The kind's torque over the rigid body's.")
     parser.add_argument("--kinds", default=",".join(KINDS))
     parser.add_argument("--json", type=Path)
@@ -112,9 +133,9 @@ def main() -> None:
     for kind in options.kinds.split(","):
         found, others, asked, seconds = 0, 0, 0, 0.0
         for seed in range(options.seeds):
-            recording, joint = simulate(robot, kind, seed, options.share)
+            recordings, joint = simulate(robot, kind, seed, options.share, options.recordings)
             started = time.process_time()
-            choice = choose_friction(robot, [recording], CUTOFF, settings, 5e-3)
+            choice = choose_friction(robot, recordings, CUTOFF, settings, 5e-3)
             seconds += time.process_time() - started
             hit, wrong = judge(choice, kind, joint)
             found, others, asked = found + hit, others + wrong, asked + choice.asked
