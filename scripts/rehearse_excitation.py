@@ -1,6 +1,6 @@
 """Whether designed excitation pays: the same machine identified from random and from designed motions.
 
-    python scripts/rehearse_excitation.py --json pays.json [--robot head arm] [--seeds 3] [--machine real plain]
+    python scripts/rehearse_excitation.py --json pays.json [--robot head arm] [--seeds 5] [--machine real plain]
 
 Every machine has a hidden truth that differs from its file. It is recorded three times, as long and through the same
 imperfect sensors: along random sinusoids (``sinusoids``), along a random motion of the Fourier series that is designed,
@@ -40,7 +40,7 @@ from casysid.validation import (
     true_coefficients,
     true_torque_error,
 )
-from casysid.validation.exciting import Excitation, excite, plan_set
+from casysid.validation.exciting import TORQUE_SHARE, Excitation, excite, plan_set
 from casysid.validation.rehearsal import build_machine
 
 MACHINES = {"real": PlantSettings(), "plain": PlantSettings(mechanics=PLAIN_MECHANICS)}
@@ -49,9 +49,10 @@ MEASURES = ("standard_error", "true_error", "held_out_parameters", "held_out_who
 
 def random_motion(robot, settings, seed):
     """A random motion of the series that is designed, as large as the limits of the design allow."""
-    series, count, periods = plan_set(choose_series(limits_of(robot), settings.rate), settings.duration)
-    problem = build_excitation(robot, series=series, periods=count * periods, rate=settings.rate)
-    evaluation, rng = Evaluation(problem, problem.blocks), np.random.default_rng(seed)
+    limits = limits_of(robot, torque_share=TORQUE_SHARE)
+    series, count, periods = plan_set(choose_series(limits, settings.rate), settings.duration)
+    problem = build_excitation(robot, series=series, periods=count * periods, rate=settings.rate, limits=limits)
+    evaluation, rng = Evaluation(problem), np.random.default_rng(seed)
     standing, x = find_standing(problem, seed), None
     while x is None:
         x = random_start(problem, evaluation, standing, rng)
@@ -133,15 +134,24 @@ def run(robots, machines, seeds, duration):
 
 
 def summarise(rows):
-    """Geometric means of the ratios over the seeds."""
+    """Of the ratios over the seeds the geometric mean and the factor of spread, exp of the logarithms' deviation."""
     summary = {}
     for name, machine in dict.fromkeys((row["robot"], row["machine"]) for row in rows):
-        mine = [row["ratio"] for row in rows if (row["robot"], row["machine"]) == (name, machine)]
+        mine = [row for row in rows if (row["robot"], row["machine"]) == (name, machine)]
         for rival in ("sinusoids", "random"):
-            means = {key: float(np.exp(np.mean([np.log(one[rival][key]) for one in mine]))) for key in MEASURES}
-            summary[f"{name}, {machine}: designed / {rival}"] = means
-    for what, means in summary.items():
-        print(f"{what:40s}", "  ".join(f"{key} {value:.3f}" for key, value in means.items()), flush=True)
+            logs = {key: np.log([one["ratio"][rival][key] for one in mine]) for key in MEASURES}
+            summary[f"{name}, {machine}: designed / {rival}"] = {
+                key: {"mean": float(np.exp(values.mean())), "spread": float(np.exp(values.std(ddof=len(values) > 1)))}
+                for key, values in logs.items()
+            }
+        for kind in mine[0]["figures"]:
+            covered = [one["figures"][kind]["coverage_95"] for one in mine]
+            print(
+                f"{name}, {machine}: {kind} covers {np.mean(covered):.1%} of the truth with 95 % intervals", flush=True
+            )
+    for what, ratios in summary.items():
+        text = "  ".join(f"{key} {one['mean']:.3f} (x/ {one['spread']:.2f})" for key, one in ratios.items())
+        print(f"{what:40s}", text, flush=True)
     return summary
 
 
@@ -150,7 +160,7 @@ def main():
     parser.add_argument("--json", type=Path, help="write the figures here")
     parser.add_argument("--robot", nargs="+", default=["head", "arm"])
     parser.add_argument("--machine", nargs="+", choices=list(MACHINES), default=list(MACHINES))
-    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--duration", type=float, default=30.0, help="of each recording [s]")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore", CasysidWarning)

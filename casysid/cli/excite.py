@@ -215,7 +215,7 @@ def _watch(progress: Callable[[str, float], None]) -> Progress:
     from casysid.excitation import DesignStep
 
     def tell(step: DesignStep) -> None:
-        progress("design", min(1.0, (step.start - 1 + min(step.step / 100.0, 1.0)) / (step.starts + 1)))
+        progress("design", min(1.0, (step.start + min(step.step / 100.0, 1.0)) / (step.starts + 2)))
 
     return tell
 

@@ -112,6 +112,13 @@ class JointBlock(Block):
         rows = self.depends / self.scale[:, None]
         return {self.order: np.broadcast_to(rows, (len(motion.position), *rows.shape))}
 
+    def of_joint(self, k: int) -> JointBlock:
+        """The same for the k-th of its joints alone."""
+        one = slice(k, k + 1)
+        return JointBlock(
+            self.order, self.joints[one], self.lower[one], self.upper[one], self.labels[one], self.units[one], self.n
+        )
+
     @cached_property
     def depends(self) -> npt.NDArray[np.bool_]:
         """Each on its own joint."""

@@ -23,8 +23,9 @@ def design_excitation(
 ) -> ExcitationDesign:
     """The best motion that several starts lead to. It keeps all limits, or there is an exception.
 
-    The first start is a small motion about the middle of the limits, which is feasible for certain; the others are the
-    best of many random motions.
+    The first start is a small motion about the middle of the limits, which is feasible for certain; others are the
+    best of many random motions after some steps uphill, and the last one is a mixture of what was found until then. The
+    best optima are polished: climbed from once more, close to the limits.
 
     Args:
         problem: From :func:`build_excitation`.

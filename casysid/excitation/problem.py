@@ -20,6 +20,8 @@ from casysid.robot import Robot
 
 REFINEMENT = 10
 """The check looks at so many times as many instants as the design."""
+BETWEEN = 2e-4
+"""Share of its scale that every quantity keeps to its bound at the instants of the check, for what happens between."""
 TIGHTENING = {False: 0.006, True: 0.003}
 """How far, as a share of each limit, the optimiser stays within it, for what happens between instants of its grid; less
 from a start that is given, which may be where another design started."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -11,14 +11,16 @@ import numpy.typing as npt
 
 from casysid.arrays import Array
 from casysid.excitation.blocks import Block
+from casysid.excitation.problem import ExcitationProblem
 from casysid.excitation.series import ORDERS, FourierSeries, Motion
+from casysid.excitation.watching import Watched, on_grid
 from casysid.nlp import HessianKind, NlpSettings, NonlinearProgram, build_nlp
-
-if TYPE_CHECKING:
-    from casysid.excitation.problem import ExcitationProblem
 
 FLOOR = 1e-9
 """Information per sample that no parameter is below, in the scaled units: keeps matrices invertible."""
+
+RESTORATION = 20
+"""Steps in which IPOPT may look for a motion that keeps the limits at all; longer searches rarely end well."""
 
 
 class Grid:
@@ -48,18 +50,16 @@ class Evaluation:
         counts: How often each of objective, gradient, constraints and Jacobian was evaluated.
     """
 
-    def __init__(
-        self, problem: ExcitationProblem, blocks: Sequence[Block], stride: int = 1, extra: Array | None = None
-    ) -> None:
-        """Constraints every so many instants of the design grid, dense ones twice as often as it, and at extra ones."""
-        self.problem, self.blocks = problem, tuple(blocks)
+    def __init__(self, problem: ExcitationProblem, watched: Sequence[Watched] | None = None) -> None:
+        """The constraints that are looked at, and when; None is all on the design grid."""
+        watched = on_grid(problem) if watched is None else watched
+        self.problem, self.blocks = problem, tuple(one.block for one in watched)
         self.counts = dict.fromkeys(("objective", "gradient", "constraints", "jacobian"), 0)
-        series, unit, more = problem.series, problem.limits.half_range, np.empty(0) if extra is None else extra
-        time = series.grid(problem.samples)
-        self._grid = Grid(series, time, unit)
-        sparse = Grid(series, np.append(time[::stride], more), unit)
-        dense = Grid(series, np.append(series.grid(2 * problem.samples), more), unit)
-        self._grids = [dense if block.dense else sparse for block in self.blocks]
+        series, unit = problem.series, problem.limits.half_range
+        self._grid = Grid(series, series.grid(problem.samples), unit)
+        times = {one.time.tobytes(): one.time for one in watched}  # blocks that are looked at together share a grid
+        grids = {key: Grid(series, time, unit) for key, time in times.items()}
+        self._grids = [grids[one.time.tobytes()] for one in watched]
         self._last, self._known = np.empty(0), dict[Any, Any]()
 
     @property
@@ -233,5 +233,6 @@ def default_settings(max_iterations: int, max_seconds: float, tolerance: float) 
         max_seconds=max_seconds,
         hessian=HessianKind.LIMITED_MEMORY,
         scaling=False,
-        barrier=1e-1,
+        barrier=None,
+        restoration=RESTORATION,
     )

@@ -1,17 +1,15 @@
-"""What to do with a motion that goes a little beyond its limits: where it does, and how much smaller keeps them."""
+"""What to do with a motion that goes a little beyond its limits: how much smaller it keeps them."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.excitation.problem import ExcitationProblem
-from casysid.excitation.verification import Verification, verify
+from casysid.excitation.problem import BETWEEN, ExcitationProblem
+from casysid.excitation.verification import verify
 
 SHRINKING = 1.2
 """A motion beyond its limits is made smaller by so many times the share by which it is, until it passes the check."""
-BETWEEN = 2e-4
-"""Share of its scale that every quantity keeps to its bound at the instants of the check, for what happens between."""
 
 
 def shrunk(problem: ExcitationProblem, x: Array, least: float = 0.5) -> tuple[Array, float] | None:
@@ -32,10 +30,3 @@ def shrunk(problem: ExcitationProblem, x: Array, least: float = 0.5) -> tuple[Ar
             return smaller, factor
         factor *= 1.0 - min(SHRINKING * -room + 5e-4, 0.2)
     return None
-
-
-def violated_instants(problem: ExcitationProblem, checked: Verification) -> Array:
-    """Where limits are violated, and just before and after."""
-    step = problem.series.period / (4 * problem.samples)
-    worst = np.array([one.instant for one in checked.violations])
-    return np.unique(np.concatenate([worst - step, worst, worst + step]) % problem.series.period)

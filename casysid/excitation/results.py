@@ -29,7 +29,8 @@ class DesignStep:
     """One iteration, as a progress function sees it.
 
     Attributes:
-        start: Number of the start, from 1; one more than ``starts`` while the best is repaired.
+        start: Number of the start, from 1; 0 while motions to start from are looked for, one more than ``starts`` while
+            the best are polished.
         starts: How many.
         step: Iteration from this start.
         objective: The criterion there.
@@ -78,7 +79,7 @@ class ExcitationDesign:
         problem: What was asked.
         trajectory: The answer.
         status: How the design ended.
-        starts: What came of each start; repairs of the best one come last.
+        starts: What came of each start, and then of polishing the best.
         evaluations: How often objective, gradient, constraints and Jacobian were evaluated.
         seconds: Wall time.
         shrink: Factor by which the optimiser's motion was made smaller so that it passes the check; 1 for none.

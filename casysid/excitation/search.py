@@ -1,45 +1,48 @@
-"""The search behind a design: several starts, IPOPT from each, the best one repaired and checked on a fine grid."""
+"""The search behind a design: many motions looked at, several starts, the best ones polished and checked finely."""
 
 from __future__ import annotations
 
 import dataclasses
-import time
-from collections.abc import Sequence
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from casysid.arrays import Array
-from casysid.excitation.blocks import Block, TorqueBlock
+from casysid.excitation.blocks import Block
 from casysid.excitation.criteria import Balanced, DOptimal
 from casysid.excitation.feasible import Standing, find_standing, random_start, small_start
+from casysid.excitation.mixing import mixtures
 from casysid.excitation.problem import ExcitationProblem
 from casysid.excitation.program import Evaluation, Program
-from casysid.excitation.repair import shrunk, violated_instants
-from casysid.excitation.results import DesignStatus, DesignStep, ExcitationDesign, Progress, StartReport
-from casysid.excitation.verification import Verification, verify
-from casysid.nlp import NlpIteration, NlpSettings, NlpSolution, solve_nlp
+from casysid.excitation.repair import shrunk
+from casysid.excitation.results import DesignStatus, ExcitationDesign, Progress, StartReport
+from casysid.excitation.solving import Found, Solved, Solver
+from casysid.excitation.watching import NearLimits, Watched, busy_blocks, on_grid
+from casysid.nlp import NlpSettings, NlpStatus
 
-DRAWS = 12
-"""Random motions looked at for each start; the best become starts."""
-STRIDE = 2
-"""The optimiser looks at joints' limits at every so many instants of the design grid."""
-WATCHED = 0.4
-"""The optimiser looks at the torque of joints where random motions take more than this share of the limit."""
-NEARLY = 0.997
-"""A motion that passes the check when made smaller by this factor needs no repair."""
-REPAIRS = 2
-"""How often the best motion is optimised again, with more instants where it went beyond limits."""
-FEASIBLE = 1e-6
-"""Largest violation, as a share of the limits and beyond the tightening, of what counts as keeping them."""
-
-
-class Found(NamedTuple):
-    """A motion that keeps the limits of some grid."""
-
-    objective: float
-    variables: Array
-    converged: bool
+DRAWS = 6
+"""Random motions drawn for each start."""
+EXPLORED = 2
+"""The best of them, so many for each start, are climbed from for a few steps; the best of these become starts."""
+STEPS = 15
+"""How many."""
+COARSE, STRIDE = 4, 2
+"""The optimiser looks at joints' limits at every so many instants of the design grid: while exploring, and later."""
+MIXED = 3
+"""So many mixtures of the motions found are climbed from for a few steps; the best of these becomes a start."""
+POLISHED = 2
+"""So many of the motions found are polished: climbed from within limits that are looked at often."""
+ROUNDS = 3
+"""How often, with more instants where a motion came near to limits."""
+CLOSE = 8e-4
+"""How far, as a share of each limit, a motion stays within it while it is polished."""
+BARRIER = 1e-3
+"""IPOPT's first barrier parameter then."""
+NEARLY = 0.999
+"""A motion that passes the check when made smaller by this factor is not polished again."""
+PREPARING = 60
+"""Steps towards the balanced motion before a criterion that is hard to climb is climbed."""
 
 
 class Search:
@@ -55,85 +58,50 @@ class Search:
     ) -> None:
         """Nothing found yet."""
         self.problem, self.starts, self.seed, self.settings = problem, starts, seed, settings
-        self.progress, self.began, self.stopped = progress, time.perf_counter(), False
+        self.solver = Solver(problem, starts, settings, progress)
         self.reports: list[StartReport] = []
-        self.evaluations: list[Evaluation] = []
         self.found: list[Found] = []
 
     def run(self) -> ExcitationDesign:
         """Search, then make sure of the limits."""
+        with threadpool_limits(1, user_api="blas"):  # matrices are small: threads would wait for each other
+            return self._run()
+
+    def _run(self) -> ExcitationDesign:
         standing = find_standing(self.problem, self.seed)
         safe = small_start(self.problem, standing, self.seed)
-        every = self._evaluation(self.problem, self.problem.blocks)
+        every = self.solver.count(Evaluation(self.problem))
         self.found.append(Found(every.objective(safe), safe, False))
         try:
             self._search(standing, safe, every)
         except KeyboardInterrupt:
-            self.stopped = True
+            self.solver.stopped = True
         best, shrink = self._best_within_limits(every)
-        finished = DesignStatus.CONVERGED if best.converged and not self._over() else DesignStatus.UNFINISHED
+        finished = best.converged and not self.solver.over
+        end = DesignStatus.CONVERGED if finished else DesignStatus.UNFINISHED
         return ExcitationDesign(
             problem=self.problem,
             trajectory=self.problem.trajectory(best.variables),
-            status=DesignStatus.INTERRUPTED if self.stopped else finished,
+            status=DesignStatus.INTERRUPTED if self.solver.stopped else end,
             starts=tuple(self.reports),
-            evaluations={name: sum(one.counts[name] for one in self.evaluations) for name in every.counts},
-            seconds=time.perf_counter() - self.began,
+            evaluations={name: sum(one.counts[name] for one in self.solver.evaluations) for name in every.counts},
+            seconds=self.solver.seconds,
             shrink=shrink,
         )
 
     def _search(self, standing: Standing, safe: Array, every: Evaluation) -> None:
-        """Every start, then the best again where it goes beyond limits between instants."""
+        """Random motions; the best of them for some steps; the best of these to the end; the best of these polished."""
         drawn = self._draw(standing, every) if self.starts > 1 else []
-        blocks = self._watched([safe, *drawn])
-        program = Program(self._evaluation(self.problem, blocks, STRIDE), self.settings)
-        for k, x in enumerate([safe, *drawn[: self.starts - 1]]):
-            self._solve(program, k + 1, self._prepared(k + 1, x, blocks))
-        extra = np.empty(0)
-        for _ in range(REPAIRS):
-            best = min(self.found, key=lambda one: one.objective)
-            if self._over() or shrunk(self.problem, best.variables, NEARLY) is not None:
-                break
-            checked = verify(self.problem, self.problem.trajectory(best.variables))
-            extra = np.append(extra, violated_instants(self.problem, checked))
-            self.found = [one for one in self.found if one is not best]
-            self._keep_smaller(best, every)
-            evaluation = self._evaluation(self.problem, self._watched([safe, *drawn], checked), 1, extra)
-            self._solve(Program(evaluation, self._repairing), self.starts + 1, best.variables)
-
-    def _prepared(self, number: int, x: Array, blocks: Sequence[Block]) -> Array:
-        """The start; for a criterion that is hard to climb from there, first the balanced motion near it."""
-        if isinstance(self.problem.criterion, (DOptimal, Balanced)):
-            return x
-        easier = self.problem.judged_by(Balanced())
-        program = Program(self._evaluation(easier, blocks, STRIDE), self._preparing)
-        best, solution = self._run(program, number, x)
-        if solution is None:
-            raise KeyboardInterrupt
-        if np.isfinite(best.objective):
-            every = self._evaluation(self.problem, blocks, STRIDE)
-            self.found.append(Found(every.objective(best.variables), best.variables, False))
-        return best.variables
-
-    @property
-    def _preparing(self) -> NlpSettings:
-        return dataclasses.replace(self.settings, max_iterations=min(self.settings.max_iterations, 60))
-
-    @property
-    def _repairing(self) -> NlpSettings:
-        return dataclasses.replace(self._preparing, barrier=1e-3)
-
-    def _keep_smaller(self, one: Found, every: Evaluation) -> None:
-        """Remember the motion made smaller until it passes, in case nothing better comes."""
-        smaller = shrunk(self.problem, one.variables)
-        if smaller is not None:
-            self.found.append(Found(every.objective(smaller[0]), smaller[0], one.converged))
-
-    def _evaluation(
-        self, problem: ExcitationProblem, blocks: Sequence[Block], stride: int = 1, extra: Array | None = None
-    ) -> Evaluation:
-        self.evaluations.append(Evaluation(problem, blocks, stride, extra))
-        return self.evaluations[-1]
+        blocks = busy_blocks(self.problem, [safe, *drawn[:8]])
+        explored = self._explored(drawn[: EXPLORED * (self.starts - 1)], blocks)
+        plain = max(1, self.starts - 2)  # the last start comes from a mixture
+        ends = self._climbed([safe, *explored[:plain]], blocks, every)
+        if self.starts > 2 and not self.solver.over:
+            good = [*(one.variables for one in ends), *explored[plain:]]
+            mixed = mixtures(self.problem, every, good, np.random.default_rng(self.seed), MIXED)
+            ends += self._climbed(self._explored(mixed, blocks)[:1], blocks, every, self.starts)
+        for one in sorted(ends, key=lambda one: one.objective)[:POLISHED]:
+            self._polish(one, blocks, every)
 
     def _draw(self, standing: Standing, every: Evaluation) -> list[Array]:
         """Random motions, best first."""
@@ -144,84 +112,73 @@ class Search:
         self.found += [Found(values[k], feasible[k], False) for k in np.argsort(values)[:1]]
         return [feasible[k] for k in np.argsort(values)]
 
-    def _watched(self, motions: list[Array], checked: Verification | None = None) -> list[Block]:
-        """All constraints but the torque of joints that stay far from their limits."""
-        violated = {one.label for one in checked.violations if one.kind == "torque"} if checked else set()
-        blocks: list[Block | None] = []
-        for block in self.problem.blocks:
-            if isinstance(block, TorqueBlock):
-                grid = self.problem.series.grid(self.problem.samples)
-                peak = [np.abs(block.measure(self.problem.trajectory(x).motion(grid))).max(axis=0) for x in motions[:8]]
-                wanted = np.max(peak, axis=0) > WATCHED * block.limit
-                blocks.append(block.watching(wanted | np.array([label in violated for label in block.labels])))
-            else:
-                blocks.append(block)
-        return [block for block in blocks if block is not None]
+    def _explored(self, motions: list[Array], blocks: list[Block]) -> list[Array]:
+        """Where some steps from each lead, best first; the motion itself where the steps did not keep the limits."""
+        program = self._program(self.easier, on_grid(self.problem, COARSE, blocks), self._up_to(STEPS))
+        ends = [self._solve(program, 0, x).best for x in motions]
+        return [end.variables for end in sorted(ends, key=lambda one: one.objective)]
 
-    def _solve(self, program: Program, number: int, x: Array) -> None:
-        """Run, and remember the best motion on the way and a report."""
-        if self._over():
-            return
-        first = program.evaluation.objective(x)
-        best, solution = self._run(program, number, x)
-        if np.isfinite(best.objective):
-            self.found.append(best)
-        if solution is None:
-            raise KeyboardInterrupt
-        self.reports.append(
-            StartReport(
-                status=solution.status,
-                first=first,
-                objective=best.objective,
-                iterations=solution.iterations,
-                seconds=solution.seconds,
+    def _climbed(self, starts: list[Array], blocks: list[Block], every: Evaluation, number: int = 1) -> list[Found]:
+        """The optimum from each; for a criterion that is hard to climb by way of the balanced motion near it."""
+        watched, ends = on_grid(self.problem, STRIDE, blocks), []
+        program = self._program(self.problem, watched, self.settings)
+        before = self._program(self.easier, watched, self._up_to(PREPARING))
+        for k, x in enumerate(starts, number):
+            first = every.objective(x)
+            near = x if self.easier is self.problem else self._solve(before, k, x).best.variables
+            solved = self._solve(program, k, near)
+            self._report(first, solved)
+            if np.isfinite(solved.best.objective):
+                ends.append(solved.best)
+                self.found.append(solved.best)
+        return ends
+
+    def _polish(self, one: Found, blocks: list[Block], every: Evaluation) -> None:
+        """Climb on within limits that are looked at often where the motion is near them, until the check is passed."""
+        near, x = NearLimits(self.problem, blocks), one.variables
+        settings = dataclasses.replace(self.settings, barrier=BARRIER)
+        for _ in range(ROUNDS):
+            program = self._program(self.problem, near.see(x), settings)
+            first, solved = every.objective(x), self._solve(program, self.starts + 1, x, CLOSE)
+            if not np.isfinite(solved.best.objective):
+                return
+            self._report(first, solved)
+            x = solved.best.variables
+            smaller = shrunk(self.problem, x)
+            if smaller is not None:
+                self.found.append(Found(every.objective(smaller[0]), smaller[0], solved.best.converged))
+                if smaller[1] > NEARLY:
+                    return
+
+    @cached_property
+    def easier(self) -> ExcitationProblem:
+        """The problem by a criterion that is easy to climb."""
+        easy = isinstance(self.problem.criterion, (DOptimal, Balanced))
+        return self.problem if easy else self.problem.judged_by(Balanced())
+
+    def _up_to(self, steps: int) -> NlpSettings:
+        return dataclasses.replace(self.settings, max_iterations=min(steps, self.settings.max_iterations))
+
+    def _program(self, problem: ExcitationProblem, watched: list[Watched], settings: NlpSettings) -> Program:
+        return Program(self.solver.count(Evaluation(problem, watched)), settings)
+
+    def _solve(self, program: Program, number: int, x: Array, tightening: float | None = None) -> Solved:
+        """Nothing better than the start once it is over."""
+        if self.solver.over:
+            return Solved(Found(np.inf, x, False), NlpStatus.STOPPED, 0, 0.0)
+        return self.solver.solve(program, number, x, self.problem.tightening if tightening is None else tightening)
+
+    def _report(self, first: float, solved: Solved) -> None:
+        if solved.iterations:
+            self.reports.append(
+                StartReport(
+                    status=solved.status,
+                    first=first,
+                    objective=solved.best.objective,
+                    iterations=solved.iterations,
+                    seconds=solved.seconds,
+                )
             )
-        )
-
-    def _run(self, program: Program, number: int, x: Array) -> tuple[Found, NlpSolution | None]:
-        """The optimum, or else the best motion on the way that keeps the limits of the grid; None after Ctrl-C."""
-        best = Found(np.inf, x, False)
-
-        def tell(iteration: NlpIteration) -> bool:
-            nonlocal best
-            if iteration.infeasibility <= FEASIBLE and iteration.objective < best.objective:
-                best = Found(iteration.objective, iteration.variables, False)
-            self.stopped = self.stopped or self._tell(number, iteration, best.objective)
-            return self._over()
-
-        sides, limits = _bounds(self.problem), program.evaluation.bounds(self.problem.tightening)
-        try:
-            solution = solve_nlp(
-                program.nlp,
-                x,
-                lower=sides[0],
-                upper=sides[1],
-                constraint_lower=limits[0],
-                constraint_upper=limits[1],
-                progress=tell,
-            )
-        except KeyboardInterrupt:
-            return best, None
-        if solution.success and solution.infeasibility <= FEASIBLE:
-            best = Found(solution.objective, solution.variables, True)
-        return best, solution
-
-    def _over(self) -> bool:
-        return self.stopped or time.perf_counter() - self.began > self.settings.max_seconds
-
-    def _tell(self, number: int, iteration: NlpIteration, best: float) -> bool:
-        if self.progress is None:
-            return False
-        step = DesignStep(
-            start=number,
-            starts=self.starts,
-            step=iteration.step,
-            objective=iteration.objective,
-            infeasibility=iteration.infeasibility,
-            best=min(best, *(one.objective for one in self.found)),
-            seconds=time.perf_counter() - self.began,
-        )
-        return bool(self.progress(step))
 
     def _best_within_limits(self, every: Evaluation) -> tuple[Found, float]:
         """Of all that was found, made smaller where needed, the best that passes the check; in the end the safe one."""
@@ -233,12 +190,3 @@ class Search:
             if smaller is not None and (value := every.objective(smaller[0])) < best.objective:
                 best, shrink = Found(value, smaller[0], one.converged), smaller[1]
         return best, shrink
-
-
-def _bounds(problem: ExcitationProblem) -> tuple[Array, Array]:
-    """Bounds of the variables: a start that was given stays, everything else is free."""
-    width = 1 + problem.series.size
-    lower, upper = (np.full(len(problem.limits.lower) * width, side) for side in (-np.inf, np.inf))
-    if problem.start is not None:
-        lower[::width] = upper[::width] = problem.start / problem.limits.half_range
-    return lower, upper

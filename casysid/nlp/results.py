@@ -40,6 +40,7 @@ class NlpSettings:
         acceptable_tolerance: Good enough when fifteen iterations in a row bring no more; ``tolerance`` turns this off.
         max_iterations: Largest number of iterations.
         max_seconds: Largest wall time.
+        restoration: Largest number of iterations in a row in which IPOPT looks for a feasible point and nothing else.
         hessian: Exact, or approximated from gradients.
         scaling: Scale objective and constraints by their gradients at the start.
         barrier: First value of the barrier parameter; None lets IPOPT adapt it at every step.
@@ -51,19 +52,29 @@ class NlpSettings:
     acceptable_tolerance: float = 1e-6
     max_iterations: int = 1000
     max_seconds: float = math.inf
+    restoration: int = 3_000_000
     hessian: HessianKind = HessianKind.EXACT
     scaling: bool = True
     barrier: float | None = 0.1
     linear_solver: str = "mumps"
 
     def __post_init__(self) -> None:
-        for name in ("tolerance", "constraint_tolerance", "acceptable_tolerance", "max_iterations", "max_seconds"):
+        for name in (
+            "tolerance",
+            "constraint_tolerance",
+            "acceptable_tolerance",
+            "max_iterations",
+            "max_seconds",
+            "restoration",
+        ):
             if not getattr(self, name) > 0:
                 raise ParameterError(f"NLP settings: {name} must be positive; got {getattr(self, name)}")
 
     def options(self) -> dict[str, Any]:
         """The same in CasADi's and IPOPT's words."""
-        barrier = {"ipopt.mu_strategy": "adaptive"} if self.barrier is None else {"ipopt.mu_init": self.barrier}
+        barrier: dict[str, Any] = {"ipopt.mu_strategy": "adaptive"}
+        if self.barrier is not None:  # the strategy has to be said: with a limited memory IPOPT's default is to adapt
+            barrier = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": self.barrier}
         return {
             "print_time": False,
             "ipopt.print_level": 0,
@@ -73,7 +84,9 @@ class NlpSettings:
             "ipopt.acceptable_tol": max(self.acceptable_tolerance, self.tolerance),
             "ipopt.max_iter": self.max_iterations,
             "ipopt.max_wall_time": min(self.max_seconds, 1e20),
+            "ipopt.max_resto_iter": self.restoration,
             "ipopt.hessian_approximation": self.hessian.value,
+            "ipopt.limited_memory_aug_solver": "extended",
             "ipopt.nlp_scaling_method": "gradient-based" if self.scaling else "none",
             "ipopt.linear_solver": self.linear_solver,
             **barrier,

@@ -67,7 +67,7 @@ def test_the_design_tells_more_than_random_motions_do(design, problem):
     from casysid.excitation.feasible import find_standing, random_start
     from casysid.excitation.program import Evaluation
 
-    evaluation, rng = Evaluation(problem, problem.blocks), np.random.default_rng(5)
+    evaluation, rng = Evaluation(problem), np.random.default_rng(5)
     standing = find_standing(problem, 0)
     random = [random_start(problem, evaluation, standing, rng) for _ in range(30)]
     gained = [problem.gained(problem.trajectory(x)) for x in random if x is not None]

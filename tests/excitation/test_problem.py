@@ -20,6 +20,7 @@ from casysid.excitation import (
     torque_accuracy,
 )
 from casysid.excitation.program import Evaluation
+from casysid.excitation.watching import Watched
 from casysid.robot import JointKind, Robot
 from tests.strategies import random_robot
 
@@ -48,7 +49,7 @@ def small_problem(rng):
 def test_objective_and_constraints_have_the_slopes_of_finite_differences(seed):
     rng = np.random.default_rng(seed)
     problem = small_problem(rng)
-    evaluation = Evaluation(problem, problem.blocks, stride=3, extra=np.array([0.123, 4.5]))
+    evaluation = Evaluation(problem, [Watched(block, np.array([0.123, 0.7, 4.5])) for block in problem.blocks])
     x, direction = 0.2 * rng.normal(size=(2, evaluation.variables))
     h = 1e-6
     wanted = evaluation.gradient(x)
