@@ -35,8 +35,9 @@ POLISHED = 2
 """So many of the motions found are polished: climbed from within limits that are looked at often."""
 ROUNDS = 3
 """How often, with more instants where a motion came near to limits."""
-CLOSE = 8e-4
-"""How far, as a share of each limit, a motion stays within it while it is polished."""
+CLOSE = 4e-3
+"""How far, as a share of each limit, a motion stays within it while it is polished; what is left is for the errors of a
+good controller."""
 BARRIER = 1e-3
 """IPOPT's first barrier parameter then."""
 NEARLY = 0.999
@@ -139,7 +140,10 @@ class Search:
         settings = dataclasses.replace(self.settings, barrier=BARRIER)
         for _ in range(ROUNDS):
             program = self._program(self.problem, near.see(x), settings)
-            first, solved = every.objective(x), self._solve(program, self.starts + 1, x, CLOSE)
+            first, solved = (
+                every.objective(x),
+                self._solve(program, self.starts + 1, x, min(CLOSE, self.problem.tightening)),
+            )
             if not np.isfinite(solved.best.objective):
                 return
             self._report(first, solved)
