@@ -141,12 +141,12 @@ def unordered_trial(
 
 
 def rival_moments(trial: Trial, cutoff: float) -> tuple[Regressor, Moments]:
-    """The recording smoothed at a cut-off [Hz], without knowledge of the noise."""
+    """The recording smoothed at a cut-off [Hz], its ends left out, without knowledge of the noise."""
     motion = make_motion(trial.robot, trial.recording, cutoff)
     width = tuple(coulomb_width([motion], RIVAL_WIDTH).tolist())
     friction = tuple(Coulomb(width) if isinstance(column, Coulomb) else column for column in DEFAULT_FRICTION)
     regressor = build_regressor(trial.robot, friction=friction)
-    return regressor, sum_moments(regressor, [motion], cutoff, Settings())
+    return regressor, sum_moments(regressor, [motion], cutoff, Settings(ends=False))
 
 
 def consistent_least_squares(regressor: Regressor, moments: Moments) -> Array:

@@ -37,11 +37,13 @@ class CutoffChoice:
     """A cut-off and why it was taken.
 
     Attributes:
-        cutoff: [Hz]; None when nothing was filtered.
+        cutoff: Of the torque as it is seen and judged [Hz]; None when nothing was filtered.
         candidates: Cut-offs that were tried [Hz], shape (k,).
         error: Their cross-validated relative torque error, geometric mean over joints, shape (k,).
         motion_band: Frequency below which 95 % of the velocity's energy lies, the fastest joint's [Hz].
         reason: In words.
+        equations: Cut-off of the equations' average, where it is another [Hz]; see
+            :mod:`casysid.identification.equation_band`.
     """
 
     cutoff: float | None
@@ -49,6 +51,12 @@ class CutoffChoice:
     error: Array
     motion_band: float
     reason: str
+    equations: float | None = None
+
+    @property
+    def fitted(self) -> float | None:
+        """Up to where torques are fitted [Hz]."""
+        return self.equations or self.cutoff
 
 
 def choose_cutoff(

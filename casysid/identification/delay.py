@@ -21,7 +21,7 @@ from casysid.arrays import Array, frozen
 from casysid.errors import RecordingError
 from casysid.estimation import Ridge, WeightedLeastSquares
 from casysid.estimation.cross_validation import contiguous_folds
-from casysid.identification.problem import MINIMUM_BLOCKS, build_problem
+from casysid.identification.problem import MINIMUM_BLOCKS, build_problem, counted
 from casysid.identification.settings import Settings
 from casysid.identification.shifted import NODE_SPACING, NODES, ShiftedMoments, node_delays, sum_shifted_moments
 from casysid.recording import Recording
@@ -195,7 +195,7 @@ class _Search:
         blocks = max(MINIMUM_BLOCKS, -(-self._settings.blocks // len(self._recordings)))
         return sum_shifted_moments(
             self._regressor,
-            self._problem.motions,
+            counted(self._problem.motions, self._settings),
             self._recordings,
             node_delays(centre, self._cutoff),
             self._cutoff,

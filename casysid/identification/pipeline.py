@@ -18,6 +18,8 @@ from casysid.identifiability import BaseParameters, excited_base_parameters, str
 from casysid.identification.coulomb import choose_relative_width
 from casysid.identification.cutoff import COARSE_STEP, FINE_STEP, CutoffChoice, choose_cutoff
 from casysid.identification.delay import DelayChoice, choose_delay, given_delay
+from casysid.identification.equation_band import choose_equation_band
+from casysid.identification.excerpts import excerpts
 from casysid.identification.friction_choice import FrictionChoice, choose_friction
 from casysid.identification.friction_laws import friction_laws
 from casysid.identification.mistakes import Mistake, find_mistakes
@@ -33,6 +35,7 @@ from casysid.identification.problem import (
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 from casysid.identification.standstill import choose_moving_only
+from casysid.identification.stretch_ends import choose_ends
 from casysid.identification.time_base import TimeBase, settle_time_base
 from casysid.identification.torque_gains import TorqueGains, settle_torque_gains
 from casysid.projection import ProjectionResult, build_projection, project
@@ -132,18 +135,19 @@ def prepare(
     mistakes = find_mistakes(robot, fitted)
     for mistake in mistakes:
         warnings.warn(mistake.sentence, CasysidWarning, stacklevel=3)
+    settings = dataclasses.replace(settings, ends=choose_ends(robot, fitted, settings))
     cutoff, delay, width, moving_only, friction = _settle(robot, fitted, settings, progress)
     fitted, unseen = (tuple(aligned(one, delay.seconds) for one in several) for several in (fitted, unseen))
     clock.lap("tuning")
     progress("moments", 0.0)
-    build = partial(build_problem, robot, fitted, cutoff.cutoff, relative_width=width, moving_only=moving_only)
+    build = partial(build_problem, robot, fitted, cutoff.fitted, relative_width=width, moving_only=moving_only)
     problem = build(friction.settings)
     gains = settle_torque_gains(problem.moments, problem.regressor.parameters, settings)
     if gains.found:
         warnings.warn(gains.reason, CasysidWarning, stacklevel=3)
         problem = build(dataclasses.replace(friction.settings, torque_gains=tuple(gains.values)))
     predicted = tuple(
-        make_motion(robot, one, cutoff.cutoff, smoothing=position_smoothing(one, cutoff.cutoff, settings))
+        make_motion(robot, one, cutoff.fitted, smoothing=position_smoothing(one, cutoff.fitted, settings))
         for one in unseen
     )
     structural = structural_base_parameters(problem.regressor)
@@ -166,7 +170,7 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
     clock.lap("projection")
     progress("check", 0.0)
     parameters = estimate.parameters if projection is None else projection.parameters
-    judged, band = preparation.held_out or problem.motions, problem.cutoff
+    judged, band = preparation.held_out or problem.motions, preparation.cutoff.cutoff
     result = IdentificationResult(
         robot=preparation.robot,
         settings=settings,
@@ -224,13 +228,14 @@ def _settle(
     """Cut-off, sharpness of Coulomb friction, whose stands to leave out, each given the others; roughly, then finely.
 
     The cut-off is chosen with all stands in, so that all candidates are judged by the same equations. The second time
-    the torque's delay has been taken out. Further kinds of friction are chosen last.
+    the torque's delay has been taken out. Further kinds of friction are chosen last. Of long recordings, excerpts are
+    looked at, but for these.
     """
     width, friction = np.full(robot.nv, USUAL_WIDTH), FrictionChoice(settings)
     moving_only = np.zeros(robot.nv, dtype=bool)
-    delay = given_delay(robot, 0.0)
+    delay, parts = given_delay(robot, 0.0), excerpts(recordings)
     for pace, step in (("rough", COARSE_STEP), ("fine", FINE_STEP)):
-        fitted = [aligned(recording, delay.seconds) for recording in recordings]
+        fitted = [aligned(recording, delay.seconds) for recording in parts]
         cutoff = choose_cutoff(
             robot,
             fitted,
@@ -250,14 +255,16 @@ def _settle(
         )
         if pace == "rough":
             progress("delay", 0.0)
-            delay = choose_delay(robot, recordings, cutoff.cutoff, settings, width)
+            delay = choose_delay(robot, parts, cutoff.cutoff, settings, width)
             progress("delay", 1.0)
     if settings.choose_friction:
         progress("friction, kinds", 0.0)
-        friction = choose_friction(robot, fitted, cutoff.cutoff, settings, width, moving_only)
+        whole = [aligned(recording, delay.seconds) for recording in recordings]
+        friction = choose_friction(robot, whole, cutoff.cutoff, settings, width, moving_only)
         if friction.chosen:
             width = choose_relative_width(robot, fitted, cutoff.cutoff, friction.settings, moving_only)
         progress("friction, kinds", 1.0)
+    cutoff = choose_equation_band(robot, fitted, cutoff, friction.settings, width, moving_only)
     return cutoff, delay, width, moving_only, friction
 
 

@@ -208,12 +208,17 @@ def sum_moments(regressor: Regressor, motions: Sequence[Motion], cutoff: float |
             blocks=blocks,
             threads=settings.threads,
         )
-        for motion in motions
+        for motion in counted(motions, settings)
     ]
     total = parts[0]
     for part in parts[1:]:
         total = total + part
     return total
+
+
+def counted(motions: Sequence[Motion], settings: Settings) -> Sequence[Motion]:
+    """The motions without their ends where these do not count."""
+    return [motion.without_ends() for motion in motions] if settings.ends is False else motions
 
 
 def coulomb_width(

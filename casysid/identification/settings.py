@@ -33,6 +33,8 @@ class Settings:
         couplings: Transmissions that link joints, such as a wrist driven by two motors.
         time_scale: Time stamps times this are seconds; None looks whether inertial torques contradict the clock.
         quasi_static: Torques hold no inertial part, gravity and friction explain them; None lets the data decide.
+        ends: Whether equations at the ends of stretches of time count, where smoothing knows one side only; None lets
+            the data decide.
         input_noise: What is known of the noise of the measured motion; by default the positions' is found in the data.
         torque_gains: Measured torque over true torque of every degree of freedom; None fits them if needed.
         blocks: Blocks of time by which moments are kept: the folds of cross-validation and the unit of standard errors.
@@ -51,6 +53,7 @@ class Settings:
     couplings: tuple[Coupling, ...] = ()
     time_scale: float | None = None
     quasi_static: bool | None = None
+    ends: bool | None = None
     input_noise: NoiseLevels = field(default_factory=NoiseLevels)
     torque_gains: tuple[float, ...] | None = None
     blocks: int = 20

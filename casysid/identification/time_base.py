@@ -222,7 +222,7 @@ def _pieces(motion: Motion, motions: int) -> list[npt.NDArray[np.intp]]:
 
 def _start(motion: Motion) -> Motion:
     """At most the first few thousand samples."""
-    kept = {name: getattr(motion, name)[:LONGEST] for name in ("time", "q", "v", "a", "tau", "standing")}
+    kept = {name: getattr(motion, name)[:LONGEST] for name in ("time", "q", "v", "a", "tau", "standing", "settled")}
     return dataclasses.replace(motion, **kept)
 
 

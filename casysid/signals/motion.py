@@ -21,6 +21,11 @@ from casysid.signals.standstill import standing
 MINIMUM_SAMPLES = 8
 LONGEST_RESPONSE = 4096
 GAP_IN_STEPS = 5.0
+SETTLING = 1.0
+"""So many periods of the cut-off from an end, the spline is as good as anywhere: what an end does to it falls to
+``exp(-π)`` in one."""
+LARGEST_END = 0.05
+"""But no more than this share of a stretch counts as one of its ends."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -35,6 +40,7 @@ class Motion:
         tau: Torque as logged, shape (N, nv).
         velocity_noise: Standard deviation of the noise left in ``v``, shape (nv,); zeros where it cannot be known.
         standing: Which samples find which degree of freedom standing, shape (N, nv); none where it cannot be known.
+        settled: Which samples are away from the ends of stretches of time, shape (N,).
         cutoff: Of the low-pass that the positions went through [Hz]; inf when nothing was filtered.
     """
 
@@ -45,15 +51,24 @@ class Motion:
     tau: Array
     velocity_noise: Array
     standing: npt.NDArray[np.bool_]
+    settled: npt.NDArray[np.bool_]
     cutoff: float
 
     def __post_init__(self) -> None:
         for name in ("time", "q", "v", "a", "tau", "velocity_noise"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
         self.standing.setflags(write=False)
+        self.settled.setflags(write=False)
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def without_ends(self) -> Motion:
+        """The settled samples only."""
+        if self.settled.all():
+            return self
+        kept = ("time", "q", "v", "a", "tau", "standing", "settled")
+        return dataclasses.replace(self, **{name: getattr(self, name)[self.settled] for name in kept})
 
     def decimated(self, stride: int) -> Motion:
         """Torque averaged over ``stride`` samples, the motion at their middle: for rates far above the low-pass.
@@ -72,6 +87,7 @@ class Motion:
             **picked,
             tau=self.tau[:whole].reshape(parts).mean(axis=1),
             standing=np.asarray(self.standing[:whole].reshape(parts).any(axis=1)),
+            settled=np.asarray(self.settled[:whole].reshape(-1, stride).all(axis=1)),
         )
 
 
@@ -104,6 +120,9 @@ def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | No
         tau=recording.torque[rows],
         velocity_noise=_velocity_noise(robot, smoother, noise),
         standing=_standing(robot, recording, pieces, wanted, noise, v, cutoff),
+        settled=np.concatenate(
+            [_settled(recording, piece, rows, cutoff) for piece, rows in zip(pieces, wanted, strict=True)]
+        ),
         cutoff=cutoff,
     )
 
@@ -139,6 +158,7 @@ def _as_logged(robot: Robot, recording: Recording) -> Motion:
         tau=recording.torque,
         velocity_noise=np.zeros(robot.nv),
         standing=np.zeros((count, robot.nv), dtype=bool),
+        settled=np.ones(count, dtype=bool),
         cutoff=np.inf,
     )
 
@@ -157,6 +177,16 @@ def _smooth_piece(
     assert recording.time is not None
     at = recording.time[rows] - recording.torque_delay if recording.torque_delay else None
     return state_from_channels(robot, *smoother.states(recording.position[piece], at))
+
+
+def _settled(
+    recording: Recording, piece: slice, rows: npt.NDArray[np.intp], cutoff: float
+) -> npt.NDArray[np.bool_]:
+    """Which samples' motion is away from both ends of its stretch."""
+    assert recording.time is not None
+    time, moved = recording.time[piece], recording.time[rows] - recording.torque_delay
+    end = min(SETTLING / cutoff, LARGEST_END * (time[-1] - time[0]))
+    return np.asarray((moved >= time[0] + end) & (moved <= time[-1] - end))
 
 
 def _velocity_noise(robot: Robot, smoother: Smoother, channel_noise: Array) -> Array:
