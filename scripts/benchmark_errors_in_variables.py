@@ -1,14 +1,18 @@
 """Errors in variables against least squares with the best cut-off there is, on simulated robots.
 
-    python scripts/benchmark_errors_in_variables.py [--json FILE] [--quick] [--measures accuracy,flatness,...]
+    python scripts/benchmark_errors_in_variables.py [--workers 2] [--json FILE] [--resume] [--measures accuracy,...]
 
 accuracy   `identify` with method eiv and nothing told, against re-weighted least squares whose zero-phase cut-off is
            picked with the truth in view, then made consistent; held-out torque error against the noise-free truth.
+           Beside them the same least squares on the true motion and all samples: what the torque's noise alone does.
 flatness   Error over cut-offs from 1.5 to 6 times the highest frequency of the motion, with and without correction.
 unordered  Samples in random order with noise on q, v and a: error variance against least squares and Bayesian
            de-noising, noise levels given and not given.
 noise      Estimated noise of the positions over the truth, with and without quantisation.
+delay      Error of recordings whose torques are 5 ms late over that of the same ones without; delay missed in samples.
 overhead   Time of the noise's moments over that of the moments alone, and time of all on 500 000 samples.
+
+Every trial is written to the JSON file as soon as it is done, and --resume takes those in it as done.
 """
 
 from __future__ import annotations
@@ -16,136 +20,34 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import os
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from noisy_trials import RATE, RIVAL_WIDTH, best_rival, make_trial, rival_moments, unordered_trial
+from noisy_measures import EIV, MEASURES, Row, run
+from noisy_trials import RATE, make_trial, rival_moments
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from casysid.estimation import BayesianDenoising, ErrorsInVariables, WeightedLeastSquares
-from casysid.identification import Settings, identify
+from casysid.identification import identify
 from casysid.identification.problem import build_problem
-from casysid.signals import position_noise
 
-NOISE, HIGHEST = (1e-5, 1e-4, 1e-3), (2.0, 6.0)
-FLAT_RATIOS = (1.5, 2.0, 3.0, 4.0, 6.0)
-SHARES = (0.03, 0.1)
 LARGE = 500_000
-EIV = Settings(method=ErrorsInVariables())
-Rows = list[dict[str, Any]]
-Tick = Callable[[], None]
+LARGEST_OVERHEAD, LONGEST = 4.0, 60.0
+FEWER_SEEDS = {"flatness": 2, "delay": 2}
+"""Measures whose trials take long and differ little; no more seeds for these."""
+BUNDLED_ONLY = ("flatness", "delay")
 
 
-def rms(values: Sequence[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
-def accuracy(robots: Sequence[str], seeds: Sequence[int], duration: float, tick: Tick) -> Rows:
-    rows = []
-    for robot in robots:
-        for noise in NOISE:
-            for highest in HIGHEST:
-                ours, rival, cutoffs = [], [], []
-                for seed in seeds:
-                    trial = make_trial(robot, seed, noise, highest, duration=duration)
-                    error, cutoff = best_rival(trial, highest)
-                    result = identify(trial.robot, trial.recording, EIV)
-                    ours.append(trial.error(result.parameters, result.regressor))
-                    rival.append(error)
-                    cutoffs.append([cutoff, result.cutoff.cutoff])
-                    tick()
-                ratio = rms(ours) / rms(rival)
-                rows.append(
-                    {"robot": Path(robot).stem, "noise": noise, "highest": highest, "ours": ours, "rival": rival}
-                    | {"cutoffs": cutoffs, "ratio": ratio}
-                )
-    return rows
-
-
-def flatness(robots: Sequence[str], seeds: Sequence[int], duration: float, tick: Tick) -> Rows:
-    rows = []
-    for robot in robots:
-        for noise in NOISE:
-            for highest in HIGHEST:
-                errors: dict[str, Rows | list[list[float]]] = {"eiv": [], "wls": []}
-                for seed in seeds:
-                    trial = make_trial(robot, seed, noise, highest, duration=duration)
-                    for name, method in (("eiv", ErrorsInVariables()), ("wls", WeightedLeastSquares())):
-                        settings = Settings(method=method)
-                        found = []
-                        for ratio in FLAT_RATIOS:
-                            problem = build_problem(
-                                trial.robot,
-                                [trial.recording],
-                                ratio * highest,
-                                settings,
-                                relative_width=RIVAL_WIDTH,
-                            )
-                            estimate = method.estimate(problem.moments, problem.regressor.prior)
-                            found.append(trial.error(estimate.parameters))
-                        errors[name].append(found)
-                    tick()
-                over = {name: [rms(column) for column in np.transpose(found)] for name, found in errors.items()}
-                rows.append(
-                    {"robot": Path(robot).stem, "noise": noise, "highest": highest, **over}
-                    | {f"{name}_spread": max(found) / min(found) for name, found in over.items()}
-                )
-    return rows
-
-
-def unordered(robots: Sequence[str], seeds: Sequence[int], samples: int, tick: Tick) -> Rows:
-    rows = []
-    methods = {"wls": WeightedLeastSquares(), "bayes": BayesianDenoising(), "eiv": ErrorsInVariables()}
-    for robot in robots:
-        for share in SHARES:
-            errors: dict[str, list[float]] = {}
-            for seed in seeds:
-                trial, levels = unordered_trial(robot, seed, 1e-3, share, samples=samples)
-                for told, settings in (("", Settings()), (", given", Settings(input_noise=levels))):
-                    problem = build_problem(trial.robot, [trial.recording], None, settings)
-                    for name, method in methods.items():
-                        if told and name != "eiv":
-                            continue  # they do not use the levels
-                        found = method.estimate(problem.moments, problem.regressor.prior).parameters
-                        errors.setdefault(name + told, []).append(trial.error(found) ** 2)
-                tick()
-            variance = {name: float(np.mean(found)) for name, found in errors.items()}
-            best = variance["eiv, given"]
-            rows.append(
-                {"robot": Path(robot).stem, "share": share, **variance}
-                | {"of least squares": best / variance["wls"], "of Bayes": best / variance["bayes"]}
-            )
-    return rows
-
-
-def noise_levels(robots: Sequence[str], seeds: Sequence[int], duration: float, tick: Tick) -> Rows:
-    rows = []
-    for robot in robots:
-        for noise in NOISE:
-            for highest in HIGHEST:
-                for step in (0.0, 1e-4):
-                    ratios = []
-                    for seed in seeds:
-                        trial = make_trial(robot, seed, noise, highest, duration=duration)
-                        logged = trial.recording.position
-                        logged = np.round(logged / step) * step if step else logged
-                        true = np.sqrt(np.mean((logged - trial.clean.channels) ** 2, axis=0))
-                        ratios.append(position_noise(trial.recording.time, logged) / true)
-                        tick()
-                    rows.append(
-                        {"robot": Path(robot).stem, "noise": noise, "highest": highest, "step": step}
-                        | {"lowest": float(np.min(ratios)), "largest": float(np.max(ratios))}
-                    )
-    return rows
-
-
-def overhead(samples: int, tick: Tick) -> Rows:
+def overhead(samples: int) -> Row:
+    """Times of moments, of moments with their noise, and of the whole identification [s]."""
     trial = make_trial("head", 0, 1e-4, 2.0, duration=samples / RATE)
     cutoff, seconds = 12.0, {}
     rival_moments(dataclasses.replace(trial, recording=trial.recording.split(0.1)[0]), cutoff)  # compiles
@@ -154,41 +56,60 @@ def overhead(samples: int, tick: Tick) -> Rows:
         "with noise": lambda: build_problem(trial.robot, [trial.recording], cutoff, EIV),
         "all": lambda: identify(trial.robot, trial.recording, EIV),
     }
-    for name, run in runs.items():
+    for name, timed in runs.items():
         wall, cpu = time.perf_counter(), time.process_time()
-        run()
+        timed()
         seconds |= {f"{name} [s]": time.perf_counter() - wall, f"{name}, CPU [s]": time.process_time() - cpu}
-        tick()
     ratio = seconds["with noise, CPU [s]"] / seconds["moments, CPU [s]"] - 1.0
-    return [{"samples": samples, **seconds, "overhead": ratio}]
+    return {"samples": samples, **seconds, "overhead": ratio}
 
 
-def show(console: Console, title: str, rows: Rows) -> None:
-    names = [name for name, value in rows[0].items() if not (isinstance(value, list) and name not in ("eiv", "wls"))]
+def run_all(name: str, places: Sequence[Row], size: float, workers: int) -> Iterator[Row]:
+    """Trials in the order in which they are done."""
+    if workers == 1:
+        yield from (run(name, place, size) for place in places)
+        return
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        for done in as_completed([pool.submit(run, name, place, size) for place in places]):
+            yield done.result()
+
+
+def write(figures: dict[str, list[Row]], path: Path | None) -> None:
+    """The trials of all measures, replaced as a whole."""
+    if path is not None:
+        partial = path.with_name(f".{path.name}.part")
+        partial.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+        os.replace(partial, path)
+
+
+def show(console: Console, title: str, rows: Sequence[Row], limits: dict[str, float]) -> None:
+    """A table whose headers name the limits and whose cells beyond them are marked."""
     table = Table(title=title)
-    for name in names:
-        table.add_column(name, justify="right")
+    for name in rows[0]:
+        table.add_column(f"{name}\n<= {limits[name]:g}" if name in limits else name, justify="right")
     for row in rows:
-        table.add_row(*(_word(row[name]) for name in names))
+        table.add_row(*(_cell(value, limits.get(name)) for name, value in row.items()))
     console.print(table)
 
 
-def _word(value: Any) -> str:
-    if isinstance(value, list):
-        return " ".join(_word(item) for item in value)
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+def _cell(value: Any, limit: float | None) -> str:
+    values = value if isinstance(value, list) else [value]
+    word = " ".join(f"{one:.3g}" if isinstance(one, float) else str(one) for one in values)
+    return f"[red]{word} ![/red]" if limit is not None and value > limit else word
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--resume", action="store_true", help="trials in the JSON file are done")
     parser.add_argument("--quick", action="store_true", help="head only, one seed, short recordings")
+    parser.add_argument("--workers", type=int, default=1, help="processes side by side")
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--duration", type=float, default=20.0, help="of a recording [s]")
     parser.add_argument("--samples", type=int, default=40_000, help="without order")
     parser.add_argument("--robots", help="bundled models and paths of files, separated by commas")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
-    parser.add_argument("--measures", default="accuracy,flatness,unordered,noise,overhead")
+    parser.add_argument("--measures", default=",".join([*MEASURES, "overhead"]))
     options = parser.parse_args()
     found = [str(options.data / file) for file in ("kuka_iiwa14_lasa/iiwa14.urdf", "staubli_tx40/tx40.urdf")]
     robots = ["head", "arm", *(path for path in found if Path(path).exists())]
@@ -196,27 +117,32 @@ def main() -> None:
         robots = options.robots.split(",")
     if options.quick:
         robots, options.seeds, options.duration, options.samples = robots[:1], 1, 10.0, 20_000
-    seeds, cells = range(options.seeds), options.seeds * len(robots)
-    jobs = {
-        "accuracy": (6 * cells, lambda tick: accuracy(robots, seeds, options.duration, tick)),
-        "flatness": (6 * cells, lambda tick: flatness(robots, seeds, options.duration, tick)),
-        "unordered": (2 * cells, lambda tick: unordered(robots, seeds, options.samples, tick)),
-        "noise": (12 * cells, lambda tick: noise_levels(robots, seeds, options.duration, tick)),
-        "overhead": (3, lambda tick: overhead(20_000 if options.quick else LARGE, tick)),
-    }
-    console, figures = Console(), {}
-    with Progress(console=Console(stderr=True), transient=True) as progress, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        for name in options.measures.split(","):
-            count, job = jobs[name]
-            task = progress.add_task(name, total=count)
-            figures[name] = job(lambda task=task: progress.advance(task))
-            show(console, name, figures[name])
-            if options.json:
-                options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    done = json.loads(options.json.read_text(encoding="utf-8")) if options.resume and options.json.exists() else {}
+    console, figures = Console(width=150), dict(done)
+    for name in options.measures.split(","):
+        if name == "overhead":
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                figures[name] = [overhead(20_000 if options.quick else LARGE)]
+            limits = {"overhead": LARGEST_OVERHEAD, "all [s]": LONGEST}
+            show(console, name, figures[name], limits)
+            write(figures, options.json)
+            continue
+        measure = MEASURES[name]
+        chosen = [robot for robot in robots if name not in BUNDLED_ONLY or "/" not in robot]
+        places = measure.places(chosen, min(options.seeds, FEWER_SEEDS.get(name, options.seeds)))
+        trials = figures.setdefault(name, [])
+        left = [place for place in places if not any(place.items() <= trial.items() for trial in trials)]
+        size = options.samples / RATE if name == "unordered" else options.duration
+        with Progress(console=Console(stderr=True), transient=True) as progress:
+            for trial in progress.track(run_all(name, left, size, options.workers), total=len(left), description=name):
+                trials.append(trial)
+                write(figures, options.json)
+        show(console, name, measure.table(trials), measure.limits)
     if "accuracy" in figures:
-        ratios = [row["ratio"] for row in figures["accuracy"]]
-        console.print(f"ours / rival: geometric mean {np.exp(np.mean(np.log(ratios))):.3f}, largest {max(ratios):.3f}")
+        ratios = [row["ours / rival"] for row in MEASURES["accuracy"].table(figures["accuracy"])]
+        mean = float(np.exp(np.mean(np.log(ratios))))
+        console.print(f"ours / rival: geometric mean {mean:.3f} (<= 1), largest {max(ratios):.3f} (<= 1.15)")
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from casysid.arrays import Array
 from casysid.bundled import find_model
 from casysid.dynamics import DEFAULT_FRICTION, Coulomb, Regressor, build_regressor
 from casysid.estimation import WeightedLeastSquares
-from casysid.identification import Settings
+from casysid.identification import IdentificationResult, Settings
 from casysid.identification.problem import MOTION_TO_TORQUE_BAND, coulomb_width, make_motion, sum_moments
 from casysid.moments import Moments
 from casysid.projection import build_projection, constrained_least_squares
@@ -66,13 +66,19 @@ class Trial:
         predicted = (regressor or self.regressor).predict(parameters, self.unseen.q, self.unseen.v, self.unseen.a)
         return float(np.linalg.norm(predicted - self.torque) / np.linalg.norm(self.torque - self.torque.mean(axis=0)))
 
+    def error_of(self, result: IdentificationResult) -> float:
+        """The same of an identification; friction of the true kinds is judged with the true change of sign."""
+        return self.error(result.parameters, result.regressor if result.friction.chosen else self.regressor)
+
 
 def load_robot(name: str) -> Robot:
     """A bundled model by name, else a file."""
     return Robot.from_file(Path(name) if "/" in name else find_model(name))
 
 
-def make_trial(name: str, seed: int, noise: float, highest: float, *, duration: float = 20.0) -> Trial:
+def make_trial(
+    name: str, seed: int, noise: float, highest: float, *, duration: float = 20.0, delay: float = 0.0
+) -> Trial:
     """A trial.
 
     Args:
@@ -81,6 +87,7 @@ def make_trial(name: str, seed: int, noise: float, highest: float, *, duration: 
         noise: Standard deviation of the encoders' [rad, m].
         highest: Frequency of the motion [Hz].
         duration: [s].
+        delay: By how much the torques are logged late [s].
     """
     robot = load_robot(name)
     friction = tuple(Coulomb(TRUE_WIDTH) if isinstance(column, Coulomb) else column for column in DEFAULT_FRICTION)
@@ -89,11 +96,11 @@ def make_trial(name: str, seed: int, noise: float, highest: float, *, duration: 
     time = np.arange(int(duration * RATE)) / RATE
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # weight beyond effort limits does not matter here
-        clean, unseen = (
-            design_sinusoids(robot, duration=duration, seed=2 * seed + k, band=(0.1, highest)).sample(time)
-            for k in range(2)
+        fitted, other = (
+            design_sinusoids(robot, duration=duration, seed=2 * seed + k, band=(0.1, highest)) for k in range(2)
         )
-    torque, true_torque = (regressor.predict(truth, motion.q, motion.v, motion.a) for motion in (clean, unseen))
+    clean, earlier, unseen = fitted.sample(time), fitted.sample(time - delay), other.sample(time)
+    torque, true_torque = (regressor.predict(truth, motion.q, motion.v, motion.a) for motion in (earlier, unseen))
     rng = np.random.default_rng([seed, 1])
     recording = Recording(
         channels=robot.channels,

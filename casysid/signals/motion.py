@@ -179,9 +179,7 @@ def _smooth_piece(
     return state_from_channels(robot, *smoother.states(recording.position[piece], at))
 
 
-def _settled(
-    recording: Recording, piece: slice, rows: npt.NDArray[np.intp], cutoff: float
-) -> npt.NDArray[np.bool_]:
+def _settled(recording: Recording, piece: slice, rows: npt.NDArray[np.intp], cutoff: float) -> npt.NDArray[np.bool_]:
     """Which samples' motion is away from both ends of its stretch."""
     assert recording.time is not None
     time, moved = recording.time[piece], recording.time[rows] - recording.torque_delay
