@@ -65,13 +65,20 @@ def overhead(samples: int) -> Row:
 
 
 def run_all(name: str, places: Sequence[Row], size: float, workers: int) -> Iterator[Row]:
-    """Trials in the order in which they are done."""
-    if workers == 1:
-        yield from (run(name, place, size) for place in places)
-        return
+    """Trials in the order in which they are done; one that fails says so in its row."""
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        for done in as_completed([pool.submit(run, name, place, size) for place in places]):
-            yield done.result()
+        running = {pool.submit(run, name, place, size): place for place in places}
+        try:
+            for done in as_completed(running):
+                error = done.exception()
+                yield done.result() if error is None else running[done] | {"failed": f"{type(error).__name__}: {error}"}
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def succeeded(trials: Sequence[Row]) -> list[Row]:
+    """Trials that did not fail."""
+    return [trial for trial in trials if "failed" not in trial]
 
 
 def write(figures: dict[str, list[Row]], path: Path | None) -> None:
@@ -131,16 +138,19 @@ def main() -> None:
         measure = MEASURES[name]
         chosen = [robot for robot in robots if name not in BUNDLED_ONLY or "/" not in robot]
         places = measure.places(chosen, min(options.seeds, FEWER_SEEDS.get(name, options.seeds)))
-        trials = figures.setdefault(name, [])
+        trials = figures[name] = succeeded(figures.get(name, []))
         left = [place for place in places if not any(place.items() <= trial.items() for trial in trials)]
         size = options.samples / RATE if name == "unordered" else options.duration
         with Progress(console=Console(stderr=True), transient=True) as progress:
             for trial in progress.track(run_all(name, left, size, options.workers), total=len(left), description=name):
                 trials.append(trial)
                 write(figures, options.json)
-        show(console, name, measure.table(trials), measure.limits)
+        show(console, name, measure.table(succeeded(trials)), measure.limits)
+        for trial in trials:
+            if "failed" in trial:
+                console.print(f"{name}: {trial}", markup=False)
     if "accuracy" in figures:
-        ratios = [row["ours / rival"] for row in MEASURES["accuracy"].table(figures["accuracy"])]
+        ratios = [row["ours / rival"] for row in MEASURES["accuracy"].table(succeeded(figures["accuracy"]))]
         mean = float(np.exp(np.mean(np.log(ratios))))
         console.print(f"ours / rival: geometric mean {mean:.3f} (<= 1), largest {max(ratios):.3f} (<= 1.15)")
 

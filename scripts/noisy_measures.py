@@ -23,7 +23,8 @@ FLAT_RATIOS = (1.5, 2.0, 3.0, 4.0, 6.0)
 SHARES = (0.03, 0.1)
 STEPS = (0.0, 1e-4)
 DELAY = 5e-3
-EIV = Settings(method=ErrorsInVariables())
+EIV = Settings(method=ErrorsInVariables(), threads=1)
+"""Trials run side by side, so each takes one thread."""
 Row = dict[str, Any]
 
 
@@ -44,9 +45,9 @@ class Measure:
     limits: dict[str, float]
 
     def places(self, robots: Sequence[str], seeds: int) -> list[Row]:
-        """Everything that there is to run."""
-        values = product(robots, *self.grid.values(), range(seeds))
-        return [dict(zip(("robot", *self.grid, "seed"), chosen, strict=True)) for chosen in values]
+        """Everything that there is to run, seed by seed: who stops has fewer seeds, but all of the grid."""
+        values = product(range(seeds), robots, *self.grid.values())
+        return [dict(zip(("seed", "robot", *self.grid), chosen, strict=True)) for chosen in values]
 
     def table(self, trials: Sequence[Row]) -> list[Row]:
         """One row for every place on the grid that has trials."""

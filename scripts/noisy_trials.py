@@ -148,8 +148,10 @@ def unordered_trial(
 
 
 def rival_moments(trial: Trial, cutoff: float) -> tuple[Regressor, Moments]:
-    """The recording smoothed at a cut-off [Hz], its ends left out, without knowledge of the noise."""
+    """The recording smoothed at a cut-off [Hz], its ends and stands left out, without knowledge of the noise."""
     motion = make_motion(trial.robot, trial.recording, cutoff)
+    always = motion.standing.all(axis=0)  # noise hides all motion
+    motion = dataclasses.replace(motion, standing=motion.standing & ~always)
     width = tuple(coulomb_width([motion], RIVAL_WIDTH).tolist())
     friction = tuple(Coulomb(width) if isinstance(column, Coulomb) else column for column in DEFAULT_FRICTION)
     regressor = build_regressor(trial.robot, friction=friction)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,6 +30,8 @@ from casysid.robot import Robot
 
 FOLDS = 10
 """Stretches of time that are left out one after the other."""
+WORSE = 1.01
+"""Stretches left out must not be predicted worse than so, in squared error."""
 HOPELESS = 1.5
 """A cut-off at which parameters scatter so many times as much as at the best ends the search upwards."""
 
@@ -56,18 +59,20 @@ def choose_equation_band(
     highest = HIGHEST_SHARE_OF_RATE * min(recording.rate for recording in recordings)
     steps = max(int(np.log(highest / choice.cutoff) / np.log(COARSE_STEP)), 0)
     candidates = choice.cutoff * COARSE_STEP ** np.arange(steps + 1)
-    found: list[float] = []
+    trials: list[_Trial] = []
     for cutoff in candidates:
         problem = build_problem(
             robot, recordings, cutoff, settings, relative_width=relative_width, moving_only=moving_only, quick=True
         )
         moments, prior = problem.moments, problem.regressor.prior
-        if not found:
-            weights = Ridge(standard_errors=False).estimate(moments, prior).noise_std ** -2.0
-            metric = moments.pooled(weights).xx
-        found.append(scatter(moments, prior, metric))
-        if found[-1] > HOPELESS * min(found):
+        if not trials:
+            seen = moments
+            lowest = Ridge(standard_errors=False).estimate(moments, prior)
+            ridge = Ridge(strength=lowest.diagnostics.get("strength", 0.0), standard_errors=False)
+        trials.append(_left_out(ridge, moments, seen, prior, lowest.noise_std**-2.0))
+        if trials[-1].scatter > HOPELESS * min(trial.scatter for trial in trials):
             break
+    found = [trial.scatter if trial.error <= WORSE * trials[0].error else np.inf for trial in trials]
     best = int(np.argmin(found))
     if best == 0:
         return choice
@@ -78,14 +83,28 @@ def choose_equation_band(
     )
 
 
-def scatter(moments: Moments, prior: Array, metric: Array) -> float:
-    """Jackknife variance of parameters in a metric (p, p), every stretch of time left out once."""
-    whole = Ridge(standard_errors=False).estimate(moments, prior)
-    ridge = Ridge(strength=whole.diagnostics.get("strength", 0.0), standard_errors=False)
-    folds = contiguous_folds(moments.blocks, FOLDS)
-    total = 0.0
+@dataclass(frozen=True)
+class _Trial:
+    """Parameters fitted without one stretch of time after the other, leaning on the prior alike at every cut-off.
+
+    Attributes:
+        scatter: Jackknife variance of the torques that they predict.
+        error: Squared error of the torques predicted for the stretches left out.
+    """
+
+    scatter: float
+    error: float
+
+
+def _left_out(ridge: Ridge, moments: Moments, seen: Moments, prior: Array, weights: Array) -> _Trial:
+    """Fit ``moments``, judge by ``seen``, the same blocks of time through the lowest cut-off."""
+    whole = ridge.estimate(moments, prior)
+    metric, folds = seen.pooled(weights).xx, contiguous_folds(moments.blocks, FOLDS)
+    scatter = error = 0.0
     for left_out in folds:
         kept = np.setdiff1d(np.arange(moments.blocks), left_out)
-        difference = ridge.estimate(moments.select_blocks(kept), prior).parameters - whole.parameters
-        total += float(difference @ metric @ difference)
-    return total * (len(folds) - 1) / len(folds)
+        found = ridge.estimate(moments.select_blocks(kept), prior).parameters
+        difference = found - whole.parameters
+        scatter += float(difference @ metric @ difference) * (len(folds) - 1) / len(folds)
+        error += float(seen.select_blocks(left_out).residual_energy(found).sum(axis=0) @ weights)
+    return _Trial(scatter, error)

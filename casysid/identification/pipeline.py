@@ -140,12 +140,13 @@ def prepare(
     fitted, unseen = (tuple(aligned(one, delay.seconds) for one in several) for several in (fitted, unseen))
     clock.lap("tuning")
     progress("moments", 0.0)
-    build = partial(build_problem, robot, fitted, cutoff.fitted, relative_width=width, moving_only=moving_only)
-    problem = build(friction.settings)
-    gains = settle_torque_gains(problem.moments, problem.regressor.parameters, settings)
+    build = partial(build_problem, robot, fitted, relative_width=width, moving_only=moving_only)
+    problem = build(cutoff.fitted, friction.settings)
+    seen = problem if cutoff.equations is None else build(cutoff.cutoff, friction.settings, quick=True)
+    gains = settle_torque_gains(seen.moments, problem.regressor.parameters, settings)
     if gains.found:
         warnings.warn(gains.reason, CasysidWarning, stacklevel=3)
-        problem = build(dataclasses.replace(friction.settings, torque_gains=tuple(gains.values)))
+        problem = build(cutoff.fitted, dataclasses.replace(friction.settings, torque_gains=tuple(gains.values)))
     predicted = tuple(
         make_motion(robot, one, cutoff.fitted, smoothing=position_smoothing(one, cutoff.fitted, settings))
         for one in unseen

@@ -36,6 +36,8 @@ def choose_moving_only(
     if cutoff is None or not any(isinstance(column, Coulomb) for column in settings.friction):
         return np.zeros(robot.nv, dtype=bool)
     moving = make_motions(robot, recordings, cutoff, settings, moving_only=True, quick=True)
+    if all(motion.standing.all() for motion in moving):
+        return np.zeros(robot.nv, dtype=bool)
     whole = [dataclasses.replace(motion, standing=np.zeros_like(motion.standing)) for motion in moving]
     regressor = regressor_for(robot, moving, settings, relative_width)
     of_whole, of_moving = (sum_moments(regressor, motions, cutoff, settings) for motions in (whole, moving))
