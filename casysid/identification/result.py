@@ -186,6 +186,7 @@ class IdentificationResult:
             },
             "cutoff": {
                 "hz": self.cutoff.cutoff,
+                "equations_hz": self.cutoff.fitted,
                 "motion_band_hz": self.cutoff.motion_band,
                 "reason": self.cutoff.reason,
             },
