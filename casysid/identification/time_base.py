@@ -22,11 +22,11 @@ from casysid.arrays import Array
 from casysid.dynamics import Regressor, build_regressor
 from casysid.estimation.cross_validation import contiguous_folds
 from casysid.identification.cutoff import lowest_cutoff
-from casysid.identification.problem import USUAL_WIDTH, make_motion, with_widths
+from casysid.identification.problem import MOTION_TO_TORQUE_BAND, USUAL_WIDTH, make_motion, with_widths
 from casysid.identification.settings import Settings
 from casysid.recording import Recording
 from casysid.robot import Robot
-from casysid.signals import BandAverage, Motion
+from casysid.signals import BandAverage, Motion, smoothing_cutoff
 
 SUSPICIOUS = 4.0
 """Inertial torque that is so many times larger or smaller than gravity's share promises is looked into."""
@@ -107,12 +107,19 @@ def settle_time_base(
 def split_moments(robot: Robot, recordings: Sequence[Recording], settings: Settings) -> SplitMoments:
     """Moments of the start of every recording, a few thousand samples, in the motion's band."""
     cutoff = CUTOFF_MARGIN * lowest_cutoff(recordings)
-    motions = [_start(make_motion(robot, recording, cutoff, quick=True)) for recording in recordings]
+    motions = [_start(_quiet_motion(robot, recording, cutoff)) for recording in recordings]
     friction = with_widths(settings, motions, USUAL_WIDTH)
     regressor = build_regressor(robot, friction=friction, couplings=settings.couplings)
     pieces = [_rows(regressor, motion, piece, cutoff) for motion in motions for piece in _pieces(motion, len(motions))]
     grams = (np.array([rows[joint].T @ rows[joint] for rows in pieces]) for joint in range(robot.nv))
     return SplitMoments(tuple(gram for gram in grams if (gram[:, :2].sum(axis=0)[[0, 1], [0, 1]] > 0.0).all()))
+
+
+def _quiet_motion(robot: Robot, recording: Recording, cutoff: float) -> Motion:
+    """Smoothed lower where noise is heavy: noise of the accelerations would hide the inertial torques."""
+    assert recording.time is not None
+    smoothing = min(MOTION_TO_TORQUE_BAND * cutoff, smoothing_cutoff(recording.time, recording.position))
+    return make_motion(robot, recording, cutoff, smoothing=smoothing, quick=True)
 
 
 def inertial_shares(split: SplitMoments) -> Array:

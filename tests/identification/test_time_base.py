@@ -17,11 +17,11 @@ RATE, DURATION = 200.0, 20.0
 FRICTION = (Viscous(), Coulomb(width=1e-3), Offset(), Armature())
 
 
-def recorded(name, seed=0, *, quasi_static=False, rotor=1.0, velocity=False):
+def recorded(name, seed=0, *, quasi_static=False, rotor=1.0, velocity=False, noise=1e-5, highest=1.0):
     """A log of a robot whose bodies are up to 30 % off its file's, and whose rotors are ``rotor`` times as large."""
     robot, rng = bundled_robot(name), np.random.default_rng(seed)
     time = np.arange(0, DURATION, 1 / RATE)
-    motion = design_sinusoids(robot, duration=DURATION, seed=seed, band=(0.1, 1.0)).sample(time)
+    motion = design_sinusoids(robot, duration=DURATION, seed=seed, band=(0.1, highest)).sample(time)
     regressor = build_regressor(robot, friction=FRICTION, quasi_static=quasi_static)
     off = np.repeat(rng.uniform(0.7, 1.3, len(robot.links)), 10)
     drives = [rotor if parameter.kind == "armature" else 1.0 for parameter in regressor.parameters[off.size :]]
@@ -30,7 +30,7 @@ def recorded(name, seed=0, *, quasi_static=False, rotor=1.0, velocity=False):
         channels=robot.channels,
         dofs=robot.dofs,
         time=time,
-        position=motion.channels + 1e-5 * rng.normal(size=motion.channels.shape),
+        position=motion.channels + noise * rng.normal(size=motion.channels.shape),
         velocity=motion.v if velocity else None,
         torque=tau + 0.03 * tau.std(axis=0) * rng.normal(size=tau.shape),
     )
@@ -43,6 +43,14 @@ def test_an_honest_clock_is_left_alone(name, seed):
     robot, recording = recorded(name, seed)
     found = settle_time_base(robot, [recording], Settings())
     assert (found.scale, found.quasi_static, found.reason) == (1.0, False, "")
+    assert 0.4 < found.inertial_share < 2.5
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_heavy_noise_of_the_positions_does_not_hide_inertial_torques(seed):
+    robot, recording = recorded("scara", seed, noise=1e-3, highest=6.0)
+    found = settle_time_base(robot, [recording], Settings())
+    assert not found.quasi_static
     assert 0.4 < found.inertial_share < 2.5
 
 
