@@ -40,7 +40,7 @@ from casysid.validation import (
     true_coefficients,
     true_torque_error,
 )
-from casysid.validation.exciting import TORQUE_SHARE, Excitation, excite, plan_set
+from casysid.validation.exciting import Excitation, excite, plan_set
 from casysid.validation.rehearsal import build_machine
 
 MACHINES = {"real": PlantSettings(), "plain": PlantSettings(mechanics=PLAIN_MECHANICS)}
@@ -49,9 +49,8 @@ MEASURES = ("standard_error", "true_error", "held_out_parameters", "held_out_who
 
 def random_motion(robot, settings, seed):
     """A random motion of the series that is designed, as large as the limits of the design allow."""
-    limits = limits_of(robot, torque_share=TORQUE_SHARE)
-    series, count, periods = plan_set(choose_series(limits, settings.rate), settings.duration)
-    problem = build_excitation(robot, series=series, periods=count * periods, rate=settings.rate, limits=limits)
+    series, count, periods = plan_set(choose_series(limits_of(robot), settings.rate), settings.duration)
+    problem = build_excitation(robot, series=series, periods=count * periods, rate=settings.rate)
     evaluation, rng = Evaluation(problem), np.random.default_rng(seed)
     standing, x = find_standing(problem, seed), None
     while x is None:

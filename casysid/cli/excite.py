@@ -62,7 +62,7 @@ def excite(
     acceleration: Annotated[float | None, typer.Option(help="Largest acceleration [rad/s², m/s²].")] = None,
     jerk: Annotated[float | None, typer.Option(help="Largest jerk [rad/s³, m/s³].")] = None,
     velocity_share: Annotated[float, typer.Option(help="Share of the velocity limits to use.")] = 0.9,
-    torque_share: Annotated[float, typer.Option(help="Share of the effort limits to use.")] = 0.8,
+    torque_share: Annotated[float, typer.Option(help="Share of the effort limits to use.")] = 0.7,
     clearance: Annotated[float, typer.Option(help="Distance to keep between links and to the floor [m].")] = 0.01,
     floor: Annotated[float | None, typer.Option(help="Height of a floor to stay above [m].")] = None,
     box: Annotated[

@@ -84,7 +84,7 @@ def limits_of(
     *,
     position_share: float = 0.95,
     velocity_share: float = 0.9,
-    torque_share: float = 0.8,
+    torque_share: float = 0.7,
     acceleration: npt.ArrayLike = np.inf,
     jerk: npt.ArrayLike = np.inf,
 ) -> JointLimits:
@@ -97,7 +97,8 @@ def limits_of(
         robot: Its joints have one degree of freedom each.
         position_share: Share of the position range, about its middle.
         velocity_share: Share of the velocity limit, what is left is for the controller.
-        torque_share: Share of the effort limit, what is left is for what the model does not know.
+        torque_share: Share of the effort limit, what is left is for masses and friction that are not as
+            in the file.
         acceleration: Largest [rad/s², m/s²], one for all or (n,).
         jerk: Largest [rad/s³, m/s³], likewise.
 

@@ -23,7 +23,7 @@ from casysid.nlp import NlpSettings, NlpStatus
 
 DRAWS = 6
 """Random motions drawn for each start."""
-EXPLORED = 2
+EXPLORED = 3
 """The best of them, so many for each start, are climbed from for a few steps; the best of these become starts."""
 STEPS = 15
 """How many."""

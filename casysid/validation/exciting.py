@@ -13,8 +13,6 @@ from casysid.simulation.reference import Trajectory
 from casysid.simulation.trajectories import design_sinusoids
 from casysid.validation.playback import DesignedMotion
 
-TORQUE_SHARE = 0.7
-"""Of the effort limits that a designed motion uses: the machine's masses and friction are not those of the file."""
 MOST_MOTIONS = 3
 """So many motions that complement each other fill a recording; a longer one repeats them."""
 
@@ -36,9 +34,8 @@ def excite(
     """
     if kind is Excitation.SINUSOIDS:
         return design_sinusoids(robot, duration=duration, seed=seed)
-    limits = limits_of(robot, torque_share=TORQUE_SHARE)
-    series, count, periods = plan_set(choose_series(limits, rate), duration)
-    problem = build_excitation(robot, series=series, periods=periods, rate=rate, limits=limits)
+    series, count, periods = plan_set(choose_series(limits_of(robot), rate), duration)
+    problem = build_excitation(robot, series=series, periods=periods, rate=rate)
     return DesignedMotion.of(design_set(problem, count, starts=2, seed=seed, progress=progress))
 
 

@@ -7,6 +7,7 @@ from casysid.bundled import find_model
 from casysid.excitation import DOptimal, FourierSeries, build_excitation, design_excitation, verify
 from casysid.excitation.mixing import mixtures
 from casysid.excitation.program import Evaluation
+from casysid.excitation.search import CLOSE
 from casysid.excitation.watching import NearLimits, busy_blocks, on_grid
 from casysid.robot import Robot
 
@@ -83,7 +84,6 @@ def test_mixtures_come_best_first(problem):
 
 
 def test_a_polished_motion_uses_its_limits_up(design, problem):
-    tightest = {margin.kind: margin.share for margin in design.check().tightest}
-    assert 0.0 < tightest["position"] < 7e-3
-    assert 0.0 < tightest["velocity"] < 7e-3
+    shares = [margin.share for margin in design.check().tightest]
+    assert 0.0 < min(shares) < 2.0 * CLOSE
     assert design.shrink > 0.999
