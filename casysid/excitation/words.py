@@ -13,6 +13,8 @@ from casysid.identifiability import Identifiability
 
 WEAK = 0.5
 """A base parameter whose expected standard deviation is more than this share of its value is known weakly."""
+NOTHING = 1e-3
+"""Less than this share of its expected standard deviation is no value: the file says nothing of it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +98,7 @@ def _unknown(design: ExcitationDesign) -> list[str]:
         lines.append(f"Only in combination with others: {', '.join(mixed)}.")
     std, value = expected_std(design), np.abs(base.transform @ information.regressor.prior)
     words = base.words()
-    weak = [k for k in np.argsort(-std / np.maximum(value, 1e-300)) if std[k] > WEAK * value[k] > 1e-9]
+    weak = [k for k in np.argsort(-std / np.maximum(value, 1e-300)) if NOTHING * std[k] < value[k] < std[k] / WEAK]
     lines += [f"Weakly known after this motion: {words[k]} = {value[k]:.3g} ± {std[k]:.3g}." for k in weak]
     return lines
 
