@@ -88,8 +88,8 @@ def run_case(name, machine, seed, duration):
         wrong = result.regressor.predict(result.parameters - true, unseen.q, unseen.v, unseen.a)
         errors = true_torque_error(result.regressor, {"identified": result.parameters, "true": true}, unseen)
         figures[kind] = {
-            "standard_error": base.std,
-            "true_error": np.abs(base.identified - base.true),
+            "standard_error": dict(zip(base.names, base.std, strict=True)),
+            "true_error": dict(zip(base.names, np.abs(base.identified - base.true), strict=True)),
             "held_out_parameters": relative(wrong, unseen.tau),
             "held_out_whole": float(errors["identified"].mean()),
             "held_out_true_parameters": float(errors["true"].mean()),
@@ -100,7 +100,10 @@ def run_case(name, machine, seed, duration):
 
 
 def ratio(ours, other):
-    """Geometric mean over what both know."""
+    """Geometric mean over what both know, by name where there are names: friction is chosen by each recording."""
+    if isinstance(ours, dict):
+        names = [name for name in ours if name in other]
+        ours, other = [ours[name] for name in names], [other[name] for name in names]
     ours, other = np.atleast_1d(ours), np.atleast_1d(other)
     known = np.isfinite(ours) & np.isfinite(other)
     return float(np.exp(np.mean(np.log(ours[known] / other[known]))))
@@ -118,7 +121,7 @@ def run(robots, machines, seeds, duration):
                     for rival in ("sinusoids", "random")
                 }
                 plain = {
-                    kind: {key: value for key, value in one.items() if np.ndim(value) == 0}
+                    kind: {key: value for key, value in one.items() if not isinstance(value, dict)}
                     for kind, one in figures.items()
                 }
                 row = {"robot": name, "machine": machine, "seed": seed, "ratio": ratios, "figures": plain}

@@ -33,11 +33,13 @@ MIXED = 3
 """So many mixtures of the motions found are climbed from for a few steps; the best of these becomes a start."""
 POLISHED = 2
 """So many of the motions found are polished: climbed from within limits that are looked at often."""
-ROUNDS = 3
+ROUNDS = 2
 """How often, with more instants where a motion came near to limits."""
 CLOSE = 4e-3
 """How far, as a share of each limit, a motion stays within it while it is polished; what is left is for the errors of a
 good controller."""
+POLISHING = 150
+"""Steps at most each time."""
 BARRIER = 1e-3
 """IPOPT's first barrier parameter then."""
 NEARLY = 0.999
@@ -137,7 +139,7 @@ class Search:
     def _polish(self, one: Found, blocks: list[Block], every: Evaluation) -> None:
         """Climb on within limits that are looked at often where the motion is near them, until the check is passed."""
         near, x = NearLimits(self.problem, blocks), one.variables
-        settings = dataclasses.replace(self.settings, barrier=BARRIER)
+        settings = dataclasses.replace(self._up_to(POLISHING), barrier=BARRIER)
         for _ in range(ROUNDS):
             program = self._program(self.problem, near.see(x), settings)
             first, solved = (
