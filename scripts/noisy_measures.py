@@ -108,8 +108,10 @@ def flatness(robot: str, seed: int, size: float, noise: float, highest: float) -
 
 def summarise_flatness(trials: Sequence[Row]) -> Row:
     """Root mean squares over the seeds by cut-off, and the largest over the smallest."""
-    over = {name: [rms(column) for column in zip(*(one[name] for one in trials), strict=True)] for name in trials[0]}
-    over = {name: found for name, found in over.items() if name in ("eiv", "wls")}
+    over = {
+        name: [rms(column) for column in zip(*(trial[name] for trial in trials), strict=True)]
+        for name in ("eiv", "wls")
+    }
     return over | {f"spread of {name}": max(found) / min(found) for name, found in over.items()}
 
 

@@ -38,6 +38,14 @@ def test_a_table_has_one_row_for_all_seeds_with_the_ratio_of_root_mean_squares(m
     assert fast["ours / rival"] == pytest.approx(0.5)
 
 
+def test_flatness_is_the_spread_over_cut_offs_of_what_the_seeds_give_together(measures):
+    place = {"robot": "head", "noise": 1e-3, "highest": 2.0}
+    trials = [place | {"seed": seed, "eiv": [1.0, 2.0], "wls": [3.0, 30.0]} for seed in range(2)]
+    (row,) = measures.MEASURES["flatness"].table(trials)
+    assert row["spread of eiv"] == pytest.approx(2.0)
+    assert row["spread of wls"] == pytest.approx(10.0)
+
+
 def test_a_trial_keeps_its_place_beside_its_figures(measures):
     place = {"seed": 0, "robot": "two_link", "noise": 1e-3, "highest": 2.0, "step": 0.0}
     found = measures.run("noise", place, 10.0)
