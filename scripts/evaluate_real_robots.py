@@ -10,6 +10,7 @@ stands what the data settled for each robot.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import time
 import warnings
@@ -22,8 +23,8 @@ from rich.progress import track
 from rich.table import Table
 
 from casysid.dynamics import Coupling
-from casysid.estimation import ESTIMATORS, estimator_by_name
-from casysid.identification import IdentificationResult, Preparation, Settings, compare, prepare
+from casysid.estimation import ESTIMATORS, ErrorsInVariables, estimator_by_name
+from casysid.identification import IdentificationResult, Preparation, Settings, compare, prepare, solve
 from casysid.inertia import Consistency
 from casysid.recording import read_recording
 from casysid.robot import Robot
@@ -70,6 +71,10 @@ TRIALS = (
         anchor=0.404,
     ),
 )
+
+
+OWN_WAY = {ErrorsInVariables.name}
+"""Estimators that the recordings are prepared for by themselves, because they reckon with noise; the others share."""
 
 
 def prepare_trial(data: Path, trial: Trial, settings: Settings) -> Preparation:
@@ -127,8 +132,13 @@ def main() -> None:
             warnings.simplefilter("ignore")
             preparation = prepare_trial(arguments.data, trial, settings)
             prepared = time.process_time() - started
-            comparison = compare(preparation, methods, settings)
-        results, cutoff = comparison.results, preparation.cutoff.cutoff
+            comparison = compare(preparation, [one for one in methods if one.name not in OWN_WAY], settings)
+            own = {
+                one.name: solve(prepare_trial(arguments.data, trial, its), its)
+                for one in methods
+                if one.name in OWN_WAY and (its := dataclasses.replace(settings, method=one))
+            }
+        results, cutoff = {**comparison.results, **own}, preparation.cutoff.cutoff
         errors = {name: result.held_out.relative for name, result in results.items()}
         others = [error for name, error in errors.items() if name != arguments.judged]
         judged = results.get(arguments.judged)

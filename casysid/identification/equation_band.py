@@ -5,7 +5,8 @@ where most of the torque's noise is gone. But the parameters are not surest ther
 quick motion and friction's jumps tell, and if the torque's noise is white the widest is best. Least squares could not
 use it, because the noise of the motion would bias it; once that is taken out, what speaks against a wide average is
 how much the parameters scatter. They are fitted to the recordings without one stretch of time after the other, at a few
-cut-offs, and the one is taken at which the torques they predict, all seen through the lowest cut-off, differ least.
+cut-offs, and the one is taken at which the torques they predict, all seen through the lowest cut-off, differ least. The
+stretches left out must not be predicted worse for it: then the model itself fails further up.
 
 Source: the delete-a-group jackknife (Efron 1982, *The Jackknife, the Bootstrap and Other Resampling Plans*, ch. 3).
 """
@@ -30,8 +31,6 @@ from casysid.robot import Robot
 
 FOLDS = 10
 """Stretches of time that are left out one after the other."""
-WORSE = 1.01
-"""Stretches left out must not be predicted worse than so, in squared error."""
 HOPELESS = 1.5
 """A cut-off at which parameters scatter so many times as much as at the best ends the search upwards."""
 
@@ -72,7 +71,7 @@ def choose_equation_band(
         trials.append(_left_out(ridge, moments, seen, prior, lowest.noise_std**-2.0))
         if trials[-1].scatter > HOPELESS * min(trial.scatter for trial in trials):
             break
-    found = [trial.scatter if trial.error <= WORSE * trials[0].error else np.inf for trial in trials]
+    found = [trial.scatter if trial.error <= trials[0].error else np.inf for trial in trials]
     best = int(np.argmin(found))
     if best == 0:
         return choice

@@ -135,7 +135,6 @@ def prepare(
     mistakes = find_mistakes(robot, fitted)
     for mistake in mistakes:
         warnings.warn(mistake.sentence, CasysidWarning, stacklevel=3)
-    settings = dataclasses.replace(settings, ends=choose_ends(robot, fitted, settings))
     cutoff, delay, width, moving_only, friction = _settle(robot, fitted, settings, progress)
     fitted, unseen = (tuple(aligned(one, delay.seconds) for one in several) for several in (fitted, unseen))
     clock.lap("tuning")
@@ -226,17 +225,17 @@ def _project(
 def _settle(
     robot: Robot, recordings: Sequence[Recording], settings: Settings, progress: Progress
 ) -> tuple[CutoffChoice, DelayChoice, Array, Mask, FrictionChoice]:
-    """Cut-off, sharpness of Coulomb friction, whose stands to leave out, each given the others; roughly, then finely.
+    """Ends, cut-off, sharpness of Coulomb friction, stands to leave out, each given the others; roughly, then finely.
 
     The cut-off is chosen with all stands in, so that all candidates are judged by the same equations. The second time
     the torque's delay has been taken out. Further kinds of friction are chosen last. Of long recordings, excerpts are
     looked at, but for these.
     """
-    width, friction = np.full(robot.nv, USUAL_WIDTH), FrictionChoice(settings)
-    moving_only = np.zeros(robot.nv, dtype=bool)
-    delay, parts = given_delay(robot, 0.0), excerpts(recordings)
+    width, moving_only = np.full(robot.nv, USUAL_WIDTH), np.zeros(robot.nv, dtype=bool)
+    delay, parts, asked = given_delay(robot, 0.0), excerpts(recordings), settings
     for pace, step in (("rough", COARSE_STEP), ("fine", FINE_STEP)):
         fitted = [aligned(recording, delay.seconds) for recording in parts]
+        settings = dataclasses.replace(settings, ends=choose_ends(robot, fitted, asked))
         cutoff = choose_cutoff(
             robot,
             fitted,
@@ -258,6 +257,7 @@ def _settle(
             progress("delay", 0.0)
             delay = choose_delay(robot, parts, cutoff.cutoff, settings, width)
             progress("delay", 1.0)
+    friction = FrictionChoice(settings)
     if settings.choose_friction:
         progress("friction, kinds", 0.0)
         whole = [aligned(recording, delay.seconds) for recording in recordings]

@@ -190,7 +190,7 @@ def position_smoothing(recording: Recording, cutoff: float | None, settings: Set
     """Cut-off of the positions' smoothing [Hz]: lower where noise is heavy and the method reckons with noise."""
     if cutoff is None or recording.time is None or not isinstance(settings.method, ErrorsInVariables):
         return None
-    return min(MOTION_TO_TORQUE_BAND * cutoff, smoothing_cutoff(recording.time, recording.position))
+    return smoothing_cutoff(recording.time, recording.position, MOTION_TO_TORQUE_BAND * cutoff)
 
 
 def sum_moments(regressor: Regressor, motions: Sequence[Motion], cutoff: float | None, settings: Settings) -> Moments:

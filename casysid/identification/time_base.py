@@ -118,7 +118,7 @@ def split_moments(robot: Robot, recordings: Sequence[Recording], settings: Setti
 def _quiet_motion(robot: Robot, recording: Recording, cutoff: float) -> Motion:
     """Smoothed lower where noise is heavy: noise of the accelerations would hide the inertial torques."""
     assert recording.time is not None
-    smoothing = min(MOTION_TO_TORQUE_BAND * cutoff, smoothing_cutoff(recording.time, recording.position))
+    smoothing = smoothing_cutoff(recording.time, recording.position, MOTION_TO_TORQUE_BAND * cutoff)
     return make_motion(robot, recording, cutoff, smoothing=smoothing, quick=True)
 
 

@@ -13,6 +13,8 @@ SPLINE_ORDER = 3
 SAMPLES_PER_PARAMETER = 1e4
 LARGEST_LOSS = 2e-3
 """Of a motion's accelerations to smoothing."""
+LIGHT = 0.01
+"""Noise that passes, over the energy of a motion's accelerations."""
 CANDIDATES = 60
 CHANCE_LINES = 3.0
 LOWEST_LINES = 10.0
@@ -56,9 +58,11 @@ def position_noise(time: Array, position: Array) -> Array:
     return np.asarray(np.maximum(np.sqrt(floor * rate / 2.0), position_resolution(position) / np.sqrt(12.0)))
 
 
-def smoothing_cutoff(time: Array, position: Array) -> float:
-    """Cut-off [Hz] of the smoothing spline that leaves least error in the accelerations, the neediest channel's.
+def smoothing_cutoff(time: Array, position: Array, usual: float = np.inf) -> float:
+    """Cut-off [Hz] of the smoothing spline: the usual one where noise is light, else what leaves accelerations best.
 
+    Noise is light where what passes of it is no more than a hundredth of the accelerations' energy in any channel.
+    Else the cut-off is sought that leaves least error in the accelerations, the neediest channel's, up to the usual.
     A low-pass of gain ``g`` biases an inertia by ``b = Σ ω⁴ g (1 - g) S / Σ ω⁴ g² S`` for a motion with spectrum ``S``,
     and leaves noise of ``r = Σ ω⁴ g² N / Σ ω⁴ S``, which averages out: the least of ``b² + r (1 + r) / n`` is sought
     where ``b`` is small, n being what the samples are worth to a parameter. The less noise, the higher it is.
@@ -72,13 +76,25 @@ def smoothing_cutoff(time: Array, position: Array) -> float:
     motion[len(power) // 2 :] = 0.0
     size = motion.sum(axis=0)
     moving = size > 0.0
+
+    def passed(gain: Array) -> Array:
+        return np.asarray((gain**2 @ fourth) * (floor[moving] / size[moving]))
+
+    if (passed(_gain(frequency, np.array([usual]))) < LIGHT).all():
+        return usual
     lowest = min(LOWEST_LINES / (time[-1] - time[0]), rate / 4.0)
     candidates = np.geomspace(lowest, rate / 2.0, CANDIDATES)
-    gain = 1.0 / (1.0 + (frequency / candidates[:, None]) ** (2 * SPLINE_ORDER))  # (candidates, frequencies)
+    gain = _gain(frequency, candidates)
     lost = (gain * (1.0 - gain)) @ motion[:, moving] / (gain**2 @ motion[:, moving])
-    noise = (gain**2 @ fourth) * (floor[moving] / size[moving])
+    noise = passed(gain)
     cost = np.where(lost < LARGEST_LOSS, lost**2 + noise * (1.0 + noise) / SAMPLES_PER_PARAMETER, np.inf)
-    return float(candidates[np.argmin(cost, axis=0)].max(initial=candidates[0] if moving.any() else candidates[-1]))
+    best = candidates[np.argmin(cost, axis=0)].max(initial=candidates[0] if moving.any() else candidates[-1])
+    return min(usual, float(best))
+
+
+def _gain(frequency: Array, cutoffs: Array) -> Array:
+    """Of smoothing splines, shape (cutoffs, frequencies)."""
+    return np.asarray(1.0 / (1.0 + (frequency / cutoffs[:, None]) ** (2 * SPLINE_ORDER)))
 
 
 def noise_level_error(samples: int) -> float:
