@@ -110,6 +110,7 @@ def limits_of(
         if not 0.0 < share <= 1.0:
             raise ParameterError(f"limits: {name}_share must be above 0 and at most 1; got {share}")
     n, assumed = len(robot.dofs), []
+    free_speed: tuple[list[str], list[str]] = ([], [])
     lower, upper, velocity = np.empty(n), np.empty(n), np.empty(n)
     for joint in robot.joints:
         k, linear = joint.v.start, joint.kind is JointKind.PRISMATIC
@@ -119,7 +120,13 @@ def limits_of(
         velocity[k] = robot.velocity_limit[k]
         if not velocity[k] <= FASTEST:
             velocity[k] = FREE_SPEED[linear] / velocity_share
-            assumed.append(f"joint '{joint.name}' has no velocity limit: {FREE_SPEED[linear]:.3g} assumed")
+            free_speed[linear].append(joint.name)
+    assumed += [
+        f"no velocity limit, or one of zero, in the file for {', '.join(free_speed[linear])}: {FREE_SPEED[linear]:.3g} "
+        f"{'m/s' if linear else 'rad/s'} assumed"
+        for linear in (False, True)
+        if free_speed[linear]
+    ]
     middle, half = (upper + lower) / 2.0, position_share * (upper - lower) / 2.0
     limits = JointLimits(
         lower=middle - half,
