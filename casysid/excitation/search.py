@@ -35,7 +35,7 @@ POLISHED = 2
 """So many of the motions found are polished: climbed from within limits that are looked at often."""
 ROUNDS = 2
 """How often, with more instants where a motion came near to limits."""
-CLOSE = 4e-3
+CLOSE = 1.2e-2
 """How far, as a share of each limit, a motion stays within it while it is polished; what is left is for the errors of a
 good controller."""
 POLISHING = 150
