@@ -23,8 +23,8 @@ REFINEMENT = 10
 BETWEEN = 2e-4
 """Share of its scale that every quantity keeps to its bound at the instants of the check, for what happens between."""
 TIGHTENING = {False: 0.006, True: 0.003}
-"""How far, as a share of each limit, the optimiser stays within it, for what happens between instants of its grid; less
-from a start that is given, which may be where another design started."""
+"""How far, as a share of each limit, the optimiser stays within it, for what happens between instants of its grid
+and for the errors of a good controller; less from a start that is given, which may be where another design started."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

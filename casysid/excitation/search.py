@@ -35,9 +35,6 @@ POLISHED = 2
 """So many of the motions found are polished: climbed from within limits that are looked at often."""
 ROUNDS = 2
 """How often, with more instants where a motion came near to limits."""
-CLOSE = 1.2e-2
-"""How far, as a share of each limit, a motion stays within it while it is polished; what is left is for the errors of a
-good controller."""
 POLISHING = 150
 """Steps at most each time."""
 BARRIER = 1e-3
@@ -142,10 +139,7 @@ class Search:
         settings = dataclasses.replace(self._up_to(POLISHING), barrier=BARRIER)
         for _ in range(ROUNDS):
             program = self._program(self.problem, near.see(x), settings)
-            first, solved = (
-                every.objective(x),
-                self._solve(program, self.starts + 1, x, min(CLOSE, self.problem.tightening)),
-            )
+            first, solved = every.objective(x), self._solve(program, self.starts + 1, x)
             if not np.isfinite(solved.best.objective):
                 return
             self._report(first, solved)
@@ -168,11 +162,11 @@ class Search:
     def _program(self, problem: ExcitationProblem, watched: list[Watched], settings: NlpSettings) -> Program:
         return Program(self.solver.count(Evaluation(problem, watched)), settings)
 
-    def _solve(self, program: Program, number: int, x: Array, tightening: float | None = None) -> Solved:
+    def _solve(self, program: Program, number: int, x: Array) -> Solved:
         """Nothing better than the start once it is over."""
         if self.solver.over:
             return Solved(Found(np.inf, x, False), NlpStatus.STOPPED, 0, 0.0)
-        return self.solver.solve(program, number, x, self.problem.tightening if tightening is None else tightening)
+        return self.solver.solve(program, number, x)
 
     def _report(self, first: float, solved: Solved) -> None:
         if solved.iterations:

@@ -66,7 +66,7 @@ class Solver:
         self.evaluations.append(evaluation)
         return evaluation
 
-    def solve(self, program: Program, number: int, x: Array, tightening: float) -> Solved:
+    def solve(self, program: Program, number: int, x: Array) -> Solved:
         """The optimum, or else the best motion on the way that keeps the limits of the grid; Ctrl-C stops."""
         best = Found(np.inf, x, False)
 
@@ -78,7 +78,7 @@ class Solver:
             return self.over
 
         began, (least, most) = time.perf_counter(), bounds(self.problem)
-        lower, upper = program.evaluation.bounds(tightening)
+        lower, upper = program.evaluation.bounds(self.problem.tightening)
         try:
             solution = solve_nlp(
                 program.nlp,

@@ -7,7 +7,6 @@ from casysid.bundled import find_model
 from casysid.excitation import DOptimal, FourierSeries, build_excitation, design_excitation, verify
 from casysid.excitation.mixing import mixtures
 from casysid.excitation.program import Evaluation
-from casysid.excitation.search import CLOSE
 from casysid.excitation.watching import NearLimits, busy_blocks, on_grid
 from casysid.robot import Robot
 
@@ -85,5 +84,5 @@ def test_mixtures_come_best_first(problem):
 
 def test_a_polished_motion_uses_its_limits_up(design, problem):
     shares = [margin.share for margin in design.check().tightest]
-    assert 0.0 < min(shares) < 2.0 * CLOSE
+    assert 0.0 < min(shares) < 2.0 * problem.tightening
     assert design.shrink > 0.999
