@@ -28,10 +28,18 @@ from casysid.dynamics.friction_kinds import value_at
 from casysid.identification.friction_candidates import Proposal, propose
 from casysid.identification.friction_evidence import Candidate, Finding, build_evidence, choose_candidates
 from casysid.identification.friction_laws import physics_rows
-from casysid.identification.problem import Mask, coulomb_width, make_motions, regressor_for, sum_moments
+from casysid.identification.problem import (
+    MOTION_TO_TORQUE_BAND,
+    Mask,
+    coulomb_width,
+    make_motions,
+    regressor_for,
+    sum_moments,
+)
 from casysid.identification.settings import Settings
 from casysid.recording import Recording
 from casysid.robot import Robot
+from casysid.signals import smoothing_cutoff
 
 
 @dataclass(frozen=True)
@@ -86,7 +94,9 @@ def choose_friction(
     relative_width: float | Array,
     moving_only: Mask | bool = False,
 ) -> FrictionChoice:
-    """Friction columns and couplings that cross-validation over stretches of time asks for; none without time.
+    """Friction columns and couplings that cross-validation over stretches of time asks for.
+
+    None without time, nor where the positions' noise is so heavy that it would pass for friction of another kind.
 
     Args:
         robot: The robot.
@@ -96,7 +106,7 @@ def choose_friction(
         relative_width: Of the smooth sign, in root mean square velocities.
         moving_only: As for :func:`~casysid.identification.problem.build_problem`.
     """
-    if cutoff is None:
+    if cutoff is None or _any_noisy(recordings, MOTION_TO_TORQUE_BAND * cutoff):
         return FrictionChoice(_with_friction(settings, ()))
     motions = make_motions(robot, recordings, cutoff, settings, moving_only=moving_only, quick=True)
     base = regressor_for(robot, motions, settings, relative_width)
@@ -123,6 +133,13 @@ def choose_friction(
         _with_friction(settings, [proposal for proposal, _ in taken]),
         tuple(_chosen(robot, proposal, finding) for proposal, finding in taken),
         len(proposals),
+    )
+
+
+def _any_noisy(recordings: Sequence[Recording], smoothing: float) -> bool:
+    """Whether some positions are too noisy to be smoothed as high as usual [Hz]."""
+    return any(
+        one.time is not None and smoothing_cutoff(one.time, one.position, smoothing) < smoothing for one in recordings
     )
 
 

@@ -93,6 +93,16 @@ def test_plain_friction_stays_plain(seed):
     assert choice.settings == dataclasses.replace(SETTINGS, choose_friction=False)
 
 
+def test_nothing_is_chosen_through_heavy_noise_of_the_positions():
+    clean = recording("loaded_coulomb")
+    for noise, asked in ((1e-6, True), (1e-2, False)):
+        position = clean.position + noise * np.random.default_rng(0).normal(size=clean.position.shape)
+        noisy = dataclasses.replace(clean, position=position)
+        choice = choose_friction(bundled_robot("two_link"), [noisy], CUTOFF, SETTINGS, 5e-3)
+        assert (choice.asked > 0) == asked
+        assert not choice.settings.choose_friction
+
+
 def test_nothing_that_was_declared_is_proposed_again():
     known = dataclasses.replace(
         SETTINGS,
