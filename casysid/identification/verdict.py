@@ -11,6 +11,7 @@ from casysid.identification.result import IdentificationResult
 
 WORTH_NAMING = 6
 FAR_OFF = 3.0
+MUCH_WORSE, WORTH_A_REMARK = 1.5, 0.1
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,12 @@ def _remarks(result: IdentificationResult) -> list[str]:
             "other links are reliable; weigh a link or the robot and give it as knowledge."
         )
     if result.held_out is not None:
+        missed, fitted = result.held_out.relative, result.train.relative
+        if missed > max(MUCH_WORSE * fitted, WORTH_A_REMARK):
+            remarks.append(
+                f"Held-out recordings are missed by {missed:.1%}, the fitted ones by {fitted:.1%}: they hold motion or "
+                "friction that was not fitted. Fit more recordings, of other motions."
+            )
         poor = [
             dof for dof, error in zip(result.robot.dofs, result.held_out.relative_by_joint, strict=True) if error > 1.0
         ]
