@@ -143,9 +143,13 @@ class _Scores:
 
 
 def _scores_of(moments: Moments, parameters: Array, weights: Array, W: Array) -> _Scores:
-    gram = weights[:, None, None] * moments.gram[:, :, :-1, :]
-    information = np.matmul(W.T, np.matmul(gram[..., :-1], W))
-    values = np.matmul(gram, np.append(-parameters, 1.0)) @ W
+    shape = (moments.blocks, len(moments.joints), W.shape[1])
+    information, values = np.empty((*shape, W.shape[1])), np.empty(shape)
+    for joint, weight in enumerate(weights):
+        columns, squares = moments.of_joint(joint)
+        gram, own = weight * squares[:, :-1], W[columns]
+        information[:, joint] = own.T @ (gram[..., :-1] @ own)
+        values[:, joint] = (gram @ np.append(-parameters[columns], 1.0)) @ own
     return _Scores(information, values - information @ values.sum(axis=(0, 1)))  # moved to the least squares
 
 

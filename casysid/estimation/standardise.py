@@ -55,7 +55,7 @@ class StandardisedProblem:
     @property
     def normal(self) -> NormalEquations:
         """All blocks: ``xx`` with unit diagonal, ``yy`` of one, means over rows."""
-        return _normal_equations(self.gram.sum(axis=0), float(self.count.sum()))
+        return NormalEquations.of_square(self.gram.sum(axis=0), float(self.count.sum()))
 
     @property
     def is_degenerate(self) -> bool:
@@ -71,7 +71,7 @@ class StandardisedProblem:
     def normal_of(self, blocks: npt.ArrayLike) -> NormalEquations:
         """The given blocks only, still divided by the number of all rows."""
         chosen = np.asarray(blocks)
-        return _normal_equations(self.gram[chosen].sum(axis=0), float(self.count[chosen].sum()))
+        return NormalEquations.of_square(self.gram[chosen].sum(axis=0), float(self.count[chosen].sum()))
 
     def restore(self, coefficients: Array) -> Array:
         """``θ`` of shape (p,) from standardised ``β`` of shape (d,)."""
@@ -121,7 +121,7 @@ def standardise(moments: Moments, prior: Array | None = None) -> StandardisedPro
     theta0 = check_prior(moments, prior)
     shifted = moments.shifted(theta0)
     noise_std = estimate_noise_std(shifted)
-    blocks = np.einsum("j,bjmn->bmn", noise_std**-2.0, shifted.gram)  # (blocks, p + 1, p + 1)
+    blocks = np.stack(list(shifted.by_block(noise_std**-2.0)))  # (blocks, p + 1, p + 1)
     total, rows = blocks.sum(axis=0), max(float(moments.count.sum()), 1.0)
     energy = np.diag(total)[:-1] / rows
     live = np.flatnonzero(energy > ENERGY_TOLERANCE * max(energy.max(initial=0.0), np.finfo(np.float64).tiny))
@@ -184,7 +184,3 @@ def unseen_coordinates(xx: Array) -> npt.NDArray[np.bool_]:
     """Which coordinates a Gram matrix of shape (d, d) leaves open, because a direction in its null space moves them."""
     _, vectors = seen_directions(xx)
     return np.asarray(1.0 - np.einsum("mk,mk->m", vectors, vectors) > LEVERAGE_TOLERANCE)
-
-
-def _normal_equations(gram: Array, count: float) -> NormalEquations:
-    return NormalEquations(frozen(gram[:-1, :-1]), frozen(gram[:-1, -1]), float(gram[-1, -1]), count)

@@ -32,7 +32,9 @@ def nearest_plain_friction(
     kinds = {column.name: column.kind for column in columns}
     found = {kind: np.zeros(len(moments.joints)) for kind in PLAIN}
     for joint, dof in enumerate(moments.joints):
-        gram = moments.gram[:, joint, :-1, :-1].sum(axis=0)
+        row, squares = moments.of_joint(joint)
+        gram = np.zeros((len(columns), len(columns)))
+        gram[row[:, None], row] = squares[:, :-1, :-1].sum(axis=0)
         own = {kind: places[name] for kind in PLAIN if (name := f"{dof}.{kind}") in places}
         other = [places[name] for name in homeless if kinds[name] not in (Armature.kind, Spring.kind)]
         other = [column for column in other if gram[column, column] > 0.0]

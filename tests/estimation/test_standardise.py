@@ -83,7 +83,7 @@ def test_noise_of_each_joint_is_found() -> None:
         x = rng.standard_normal((4000, 4))
         rows = np.column_stack([x, x @ truth + std * rng.standard_normal(4000)])
         parts.append(rows.T @ rows)
-    moments = Moments(np.stack(parts)[None], np.full((1, 2), 4000.0), tuple("abcd"), ("first", "second"))
+    moments = Moments.from_dense(np.stack(parts)[None], np.full((1, 2), 4000.0), tuple("abcd"), ("first", "second"))
     np.testing.assert_allclose(estimate_noise_std(moments), noise, rtol=0.05)
 
 

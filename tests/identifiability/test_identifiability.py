@@ -97,7 +97,7 @@ def test_data_show_no_more_than_the_structure_has(robot, rng):
     rows = regressor.evaluate(*random_states(robot, 3, rng))
     tall = np.concatenate([rows, np.zeros((*rows.shape[:2], 1))], axis=2)
     gram = np.einsum("njm,njk->jmk", tall, tall)[None]
-    moments = Moments(gram, np.full((1, robot.nv), 3.0), regressor.names, robot.dofs)
+    moments = Moments.from_dense(gram, np.full((1, robot.nv), 3.0), regressor.names, robot.dofs)
     shown = excited_base_parameters(regressor, moments, np.ones(robot.nv))
     assert shown.rank <= min(structural_base_parameters(regressor).rank, 3 * robot.nv)
 
