@@ -259,6 +259,14 @@ class Moments:
         energy = [(sums @ row) @ row for sums, row in zip(self.squares, rows, strict=True)]
         return np.asarray(np.maximum(np.column_stack(energy), 0.0))
 
+    def scores(self, parameters: Array, weights: npt.ArrayLike | None = None) -> Array:
+        """``Σ w x (y - xᵀθ)`` of every block, shape (blocks, p), for parameters of shape (p,)."""
+        w = np.ones(len(self.joints)) if weights is None else np.asarray(weights, dtype=np.float64)
+        total = np.zeros((self.blocks, len(self.columns)))
+        for weight, own, sums in zip(w, self.row_columns, self.squares, strict=True):
+            total[:, own] += weight * (sums[:, :-1] @ np.append(-parameters[own], 1.0))
+        return total
+
     def target_energy(self) -> Array:
         """``Σ y²`` by block and joint, shape (blocks, joints)."""
         return np.column_stack([sums[:, -1, -1] for sums in self.squares])
