@@ -1,0 +1,52 @@
+"""What a drive adds to the rigid bodies: friction, offset, rotor inertia, springs; each kind in a file of its own."""
+
+from casysid.dynamics.friction.direction import (
+    Coupling,
+    Direction,
+    coupling_direction,
+    force_unit,
+    joint_directions,
+)
+from casysid.dynamics.friction.kind import DriveState, FrictionColumn, FrictionKind, Law, Term
+from casysid.dynamics.friction.kinds import (
+    DEFAULT_FRICTION,
+    FRICTION_KINDS,
+    Armature,
+    AsymmetricViscous,
+    Coulomb,
+    LoadedCoulomb,
+    Offset,
+    PowerViscous,
+    Spring,
+    Stribeck,
+    Viscous,
+)
+from casysid.dynamics.friction.model import FrictionModel
+from casysid.dynamics.friction.smooth_sign import SmoothSign, with_width
+
+__all__ = [
+    "DEFAULT_FRICTION",
+    "FRICTION_KINDS",
+    "Armature",
+    "AsymmetricViscous",
+    "Coulomb",
+    "Coupling",
+    "Direction",
+    "DriveState",
+    "FrictionColumn",
+    "FrictionKind",
+    "FrictionModel",
+    "Law",
+    "LoadedCoulomb",
+    "Offset",
+    "PowerViscous",
+    "SmoothSign",
+    "Spring",
+    "Stribeck",
+    "Term",
+    "Viscous",
+    "coupling_direction",
+    "force_unit",
+    "joint_directions",
+    "with_width",
+]
