@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from casysid.arrays import Array
 from casysid.dynamics import (
     FRICTION_KINDS,
@@ -16,6 +14,7 @@ from casysid.dynamics import (
     Direction,
     FrictionKind,
     FrictionModel,
+    JointUse,
     Viscous,
 )
 from casysid.dynamics.friction import coupling_direction, joint_directions
@@ -62,8 +61,7 @@ def propose(
     robot: Robot,
     friction: Sequence[FrictionKind],
     couplings: Sequence[Coupling],
-    speed: Array,
-    width: Array,
+    uses: Mapping[int, JointUse],
     kinds: Sequence[type[FrictionKind]] = FRICTION_KINDS,
 ) -> tuple[Proposal, ...]:
     """Everything that may join the given friction and couplings of a robot.
@@ -72,24 +70,38 @@ def propose(
         robot: Its joints with one degree of freedom are looked at.
         friction: What every joint has already; kinds of it are not proposed again.
         couplings: Transmissions that are known already.
-        speed: Root mean square velocity of each degree of freedom, shape (nv,); those that stand get no proposal.
-        width: Of each one's smooth sign, shape (nv,).
+        uses: How degrees of freedom move, by their index; those that stand get no proposal.
         kinds: Of friction that are asked for candidates.
     """
     known = {kind.kind for kind in friction}
     moving = {
-        dof: direction
-        for dof, direction in joint_directions(robot).items()
-        if speed[dof] > 0.0 and robot.joints[joint_of(robot, dof)].kind in SIMPLE_JOINTS
+        dof: use
+        for dof, use in uses.items()
+        if use.speed > 0.0 and robot.joints[joint_of(robot, dof)].kind in SIMPLE_JOINTS
     }
     alone = [
-        Proposal(f"{direction.name}.{kind.kind}", kind.kind, ((one, direction),), (dof,))
-        for dof, direction in moving.items()
+        Proposal(f"{use.direction.name}.{kind.kind}", kind.kind, ((one, use.direction),), (dof,))
+        for dof, use in moving.items()
         for kind in kinds
         if kind.kind not in known
-        for one in kind.candidates(direction, float(speed[dof]), float(width[dof]))
+        for one in kind.candidates(use)
     ]
-    return (*alone, *_transmissions(robot, friction, couplings, moving, width))
+    return (*alone, *_transmissions(robot, friction, couplings, moving))
+
+
+def joint_uses(robot: Robot, speed: Array, width: Array, travel: Array | None = None) -> dict[int, JointUse]:
+    """How every driven degree of freedom moves, by its index; ripple is not looked for.
+
+    Args:
+        robot: The robot.
+        speed: Root mean square velocity of each degree of freedom, shape (nv,).
+        width: Of each one's smooth sign, shape (nv,).
+        travel: Standard deviation of its position, shape (nv,); None where it is not known.
+    """
+    return {
+        dof: JointUse(direction, float(speed[dof]), float(width[dof]), None if travel is None else float(travel[dof]))
+        for dof, direction in joint_directions(robot).items()
+    }
 
 
 def joined(friction: Sequence[FrictionKind], couplings: Sequence[Coupling], taken: Sequence[Proposal]) -> FrictionModel:
@@ -103,14 +115,14 @@ def _transmissions(
     robot: Robot,
     friction: Sequence[FrictionKind],
     couplings: Sequence[Coupling],
-    moving: Mapping[int, Direction],
-    width: Array,
+    moving: Mapping[int, JointUse],
 ) -> Iterator[Proposal]:
     """Motors that turn with the sum or the difference of two neighbouring joints of the same kind of motion."""
     taken = [set(coupling.joints) for coupling in couplings]
     for first, second in _neighbours(robot, moving):
-        names = (moving[first].name, moving[second].name)
-        if set(names) in taken or moving[first].linear != moving[second].linear:
+        one, other = moving[first].direction, moving[second].direction
+        names = (one.name, other.name)
+        if set(names) in taken or one.linear != other.linear:
             continue
         for sign in (1.0, -1.0):
             for wanted in COUPLED:
@@ -119,12 +131,12 @@ def _transmissions(
                     continue
                 coupling = Coupling(names, (1.0, sign), tuple(kind.kind for kind in kinds))
                 direction = coupling_direction(robot, coupling)
-                own = {direction.name: float(np.abs(direction.weights) @ width)}
+                own = {direction.name: moving[first].width + moving[second].width}
                 columns = tuple((kind.with_width(own), direction) for kind in kinds)
                 yield Proposal("+".join(names), "coupling", columns, (first, second), coupling)
 
 
-def _neighbours(robot: Robot, moving: Mapping[int, Direction]) -> Iterator[tuple[int, int]]:
+def _neighbours(robot: Robot, moving: Mapping[int, JointUse]) -> Iterator[tuple[int, int]]:
     for joint in robot.joints:
         if joint.parent >= 0:
             first, second = robot.joints[joint.parent].v.start, joint.v.start

@@ -14,7 +14,7 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.dynamics import Armature, extend_regressor
-from casysid.identification.friction_candidates import Proposal, joined, propose
+from casysid.identification.friction_candidates import Proposal, joined, joint_uses, propose
 from casysid.identification.friction_evidence import Candidate, Finding, build_evidence, choose_candidates
 from casysid.identification.friction_laws import physics_rows
 from casysid.identification.problem import (
@@ -103,7 +103,7 @@ def choose_friction(
     width = coulomb_width(motions, relative_width)
     if settings.coulomb_width is not None:
         width = np.full(robot.nv, settings.coulomb_width)
-    proposals = propose(robot, settings.friction, settings.couplings, speed, width)
+    proposals = propose(robot, settings.friction, settings.couplings, joint_uses(robot, speed, width))
     if settings.quasi_static:
         proposals = tuple(one for one in proposals if Armature.kind not in [column.kind for column, _ in one.columns])
     if not proposals:

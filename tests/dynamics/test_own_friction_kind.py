@@ -24,7 +24,7 @@ from casysid.dynamics import (
     extend_regressor,
 )
 from casysid.errors import ParameterError
-from casysid.identification.friction_candidates import joined, propose
+from casysid.identification.friction_candidates import joined, joint_uses, propose
 from casysid.identification.friction_laws import broken_laws, friction_laws, physics_rows
 from casysid.identification.plain_friction import nearest_plain_friction
 from tests.simulated import bundled_robot
@@ -56,8 +56,8 @@ class Worn(FrictionKind):
         )
 
     @classmethod
-    def candidates(cls, direction, speed, width):
-        yield from (cls({direction.name: centre}) for centre in (0.0, speed))
+    def candidates(cls, use):
+        yield from (cls({use.direction.name: centre}) for centre in (0.0, use.speed))
 
     def laws(self, own, beside):
         return (Law({beside["coulomb"]: 1.0, own[1]: 1.0}, "worn backwards brakes"),)
@@ -67,7 +67,9 @@ class Worn(FrictionKind):
 
 
 def proposals():
-    return propose(ROBOT, DEFAULT_FRICTION, (), np.ones(2), np.full(2, 0.01), (*FRICTION_KINDS, Worn))
+    return propose(
+        ROBOT, DEFAULT_FRICTION, (), joint_uses(ROBOT, np.ones(2), np.full(2, 0.01)), (*FRICTION_KINDS, Worn)
+    )
 
 
 def motion():

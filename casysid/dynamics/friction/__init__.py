@@ -7,7 +7,7 @@ from casysid.dynamics.friction.direction import (
     force_unit,
     joint_directions,
 )
-from casysid.dynamics.friction.kind import DriveState, FrictionColumn, FrictionKind, Law, Term
+from casysid.dynamics.friction.kind import DriveState, FrictionColumn, FrictionKind, JointUse, Law, Term
 from casysid.dynamics.friction.kinds import (
     DEFAULT_FRICTION,
     FRICTION_KINDS,
@@ -36,6 +36,7 @@ __all__ = [
     "FrictionColumn",
     "FrictionKind",
     "FrictionModel",
+    "JointUse",
     "Law",
     "LoadedCoulomb",
     "Offset",

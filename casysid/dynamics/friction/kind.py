@@ -40,6 +40,27 @@ class DriveState:
 
 
 @dataclass(frozen=True, eq=False)
+class JointUse:
+    """How a joint moved in the recordings, from which a kind takes the variants that are worth a try.
+
+    Attributes:
+        direction: Of the joint.
+        speed: Its root mean square velocity [rad/s or m/s].
+        width: Within which its smooth signs turn [rad/s or m/s].
+        travel: Standard deviation of its position [rad or m]; None where it is not known.
+        ripple: Wave numbers that its residual torque shows over its position [rad/rad or rad/m].
+        friction_ripple: And that it shows when it is taken against the motion.
+    """
+
+    direction: Direction
+    speed: float
+    width: float
+    travel: float | None = None
+    ripple: tuple[float, ...] = ()
+    friction_ripple: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Term:
     """One column of a kind along one direction.
 
@@ -107,14 +128,8 @@ class FrictionKind(ABC):
         return self
 
     @classmethod
-    def candidates(cls, direction: Direction, speed: float, width: float) -> Iterator[FrictionKind]:
-        """Variants that are worth a try at a joint that moves, each for this joint alone.
-
-        Args:
-            direction: Of the joint.
-            speed: Its root mean square velocity [rad/s or m/s].
-            width: Within which its smooth signs turn [rad/s or m/s].
-        """
+    def candidates(cls, use: JointUse) -> Iterator[FrictionKind]:
+        """Variants that are worth a try at a joint that moves, each for this joint alone."""
         return iter(())
 
     def laws(self, own: Sequence[str], beside: Mapping[str, str]) -> tuple[Law, ...]:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import casadi as ca
 
 from casysid.dynamics.friction.direction import Direction, damping_unit
-from casysid.dynamics.friction.kind import DriveState, FrictionColumn, Law, acts_along
+from casysid.dynamics.friction.kind import DriveState, FrictionColumn, JointUse, Law, acts_along
 from casysid.dynamics.friction.kinds.viscous import Viscous
 
 
@@ -36,9 +36,9 @@ class AsymmetricViscous(FrictionColumn):
         return ca.fabs(state.velocity) if acts_along(self.joints, direction) else None
 
     @classmethod
-    def candidates(cls, direction: Direction, speed: float, width: float) -> Iterator[AsymmetricViscous]:
+    def candidates(cls, use: JointUse) -> Iterator[AsymmetricViscous]:
         """The one that there is."""
-        yield cls((direction.name,))
+        yield cls((use.direction.name,))
 
     def laws(self, own: Sequence[str], beside: Mapping[str, str]) -> tuple[Law, ...]:
         """No direction of motion is driven: it is never more than viscous friction itself."""

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from casysid.dynamics.friction.direction import Direction
-from casysid.dynamics.friction.kind import DriveState, FrictionColumn, acts_along
+from casysid.dynamics.friction.kind import DriveState, FrictionColumn, JointUse, acts_along
 from casysid.dynamics.friction.smooth_sign import SmoothSign
 from casysid.robot import Robot
 
@@ -45,9 +45,9 @@ class LoadedCoulomb(SmoothSign, FrictionColumn):
         return ca.fabs(state.static_torque(None if own is None else np.array(own))) * self.sign(state)
 
     @classmethod
-    def candidates(cls, direction: Direction, speed: float, width: float) -> Iterator[LoadedCoulomb]:
+    def candidates(cls, use: JointUse) -> Iterator[LoadedCoulomb]:
         """The one that there is."""
-        yield cls({direction.name: width}, (direction.name,))
+        yield cls({use.direction.name: use.width}, (use.direction.name,))
 
     def describe(self, direction: Direction) -> str:
         """In words."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from casysid.dynamics.friction.direction import Direction, force_unit
-from casysid.dynamics.friction.kind import DriveState, FrictionColumn, require_positive, value_at
+from casysid.dynamics.friction.kind import DriveState, FrictionColumn, JointUse, require_positive, value_at
 from casysid.dynamics.friction.smooth_sign import SmoothSign
 
 EXPONENTS = (0.5, 2.0, 3.0)
@@ -47,10 +47,10 @@ class PowerViscous(SmoothSign, FrictionColumn):
         return state.velocity * (state.velocity**2 + floor**2) ** (0.5 * (exponent - 1.0))
 
     @classmethod
-    def candidates(cls, direction: Direction, speed: float, width: float) -> Iterator[PowerViscous]:
+    def candidates(cls, use: JointUse) -> Iterator[PowerViscous]:
         """A few exponents."""
         for exponent in EXPONENTS:
-            yield cls({direction.name: width}, {direction.name: exponent})
+            yield cls({use.direction.name: use.width}, {use.direction.name: exponent})
 
     def describe(self, direction: Direction) -> str:
         """In words, with its exponent."""

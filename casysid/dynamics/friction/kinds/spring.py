@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from casysid.dynamics.friction.direction import Direction
-from casysid.dynamics.friction.kind import DriveState, FrictionColumn, acts_along
+from casysid.dynamics.friction.kind import DriveState, FrictionColumn, JointUse, acts_along
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,10 @@ class Spring(FrictionColumn):
         return state.position if acts_along(self.joints, direction) else None
 
     @classmethod
-    def candidates(cls, direction: Direction, speed: float, width: float) -> Iterator[Spring]:
+    def candidates(cls, use: JointUse) -> Iterator[Spring]:
         """One, unless the joint turns without end."""
-        if not direction.unlimited:
-            yield cls((direction.name,))
+        if not use.direction.unlimited:
+            yield cls((use.direction.name,))
 
     def describe(self, direction: Direction) -> str:
         """In words."""

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import casadi as ca
 
 from casysid.dynamics.friction.direction import Direction, force_unit, speed_unit
-from casysid.dynamics.friction.kind import DriveState, FrictionColumn, require_positive, value_at
+from casysid.dynamics.friction.kind import DriveState, FrictionColumn, JointUse, require_positive, value_at
 from casysid.dynamics.friction.smooth_sign import SmoothSign
 
 VELOCITIES = (0.05, 0.15, 0.4, 1.0)
@@ -46,11 +46,11 @@ class Stribeck(SmoothSign, FrictionColumn):
         return None if slow is None else self.sign(state) * ca.exp(-((state.velocity / slow) ** 2))
 
     @classmethod
-    def candidates(cls, direction: Direction, speed: float, width: float) -> Iterator[Stribeck]:
+    def candidates(cls, use: JointUse) -> Iterator[Stribeck]:
         """Some velocities between the smooth sign's width and the joint's usual speed."""
         for share in VELOCITIES:
-            if share * speed > width:
-                yield cls({direction.name: width}, {direction.name: share * speed})
+            if share * use.speed > use.width:
+                yield cls({use.direction.name: use.width}, {use.direction.name: share * use.speed})
 
     def describe(self, direction: Direction) -> str:
         """In words, with its velocity."""
