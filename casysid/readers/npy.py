@@ -22,12 +22,14 @@ class Member:
         kind: Of its numbers.
         rows: How many.
         width: Numbers in a row; None when rows are numbers.
+        row: The next one.
     """
 
     streams: list[IO[bytes]]
     kind: np.dtype[Any]
     rows: int
     width: int | None
+    row: int = 0
 
     def read(self, rows: int) -> Array:
         """The next rows, fewer at the end, as float64.
@@ -36,18 +38,22 @@ class Member:
             ValueError: If the archive ends before.
             TypeError: If they are no numbers.
         """
+        rows = min(rows, self.rows - self.row)
+        self.row += rows
         if self.width is None or len(self.streams) == 1:
             values = self._numbers(self.streams[0], rows * (self.width or 1))
             return values if self.width is None else values.reshape(-1, self.width)
         return np.stack([self._numbers(stream, rows) for stream in self.streams], axis=1)
 
     def _numbers(self, stream: IO[bytes], count: int) -> Array:
-        count = min(count, self.rows * (self.width or 1))
         contents = stream.read(count * self.kind.itemsize)
+        if len(contents) < count * self.kind.itemsize:
+            raise ValueError("the array ends before its last row")
         return np.frombuffer(contents, dtype=self.kind).astype(np.float64, copy=False)
 
     def skip(self, rows: int) -> None:
         """Leave out the next rows."""
+        self.row += rows
         size = rows * self.kind.itemsize * ((self.width or 1) if len(self.streams) == 1 else 1)
         for stream in self.streams:
             stream.seek(size, 1)

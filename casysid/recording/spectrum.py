@@ -31,7 +31,7 @@ class PositionSpectrum:
         frequency: From 0 to half the rate [Hz], shape (F,).
         power: One-sided density by channel, shape (F, channels), [(rad, m)²/Hz].
         rate: Of the even samples that it was taken from [Hz].
-        segments: How many periodograms it is the mean of: power is distributed as their mean of exponentials.
+        segments: How many periodograms of equal weight it is worth: power has the gamma distribution of that order.
         resolution: Quantisation step of the positions by channel, shape (channels,); 0 where there is none.
         duration: Of the recording [s].
         samples: Of the recording.
@@ -72,7 +72,7 @@ class SpectrumScan:
         self._next = 0  # number of the next even sample
         self._origin = 0.0
         self._sum = np.zeros((0, 0))
-        self._count = 0.0
+        self._count = self._squares = 0.0
         self._size = LONGEST_SEGMENT
 
     def add(self, time: Array, position: Array) -> None:
@@ -116,6 +116,7 @@ class SpectrumScan:
             power[-1] /= 2.0
         self._sum = self._sum + weight * power if self._count else weight * power
         self._count += weight
+        self._squares += weight**2
 
     def finish(self, resolution: Array, duration: float, samples: int) -> PositionSpectrum | None:
         """The spectrum of all that was added; None if that is too little."""
@@ -131,7 +132,7 @@ class SpectrumScan:
             frequency=np.arange(len(self._sum)) / (self._size * self._step),
             power=self._sum / self._count,
             rate=1.0 / self._step,
-            segments=self._count,
+            segments=self._count**2 / self._squares,
             resolution=resolution,
             duration=duration,
             samples=samples,
