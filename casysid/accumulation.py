@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from casysid.arrays import Array
 from casysid.dynamics.regressor import Regressor
 from casysid.errors import ParameterError
-from casysid.moments import Moments
+from casysid.moments import NEAR_REST, Moments
 from casysid.signals.averaging import BandAverage, WindowSums
 
 LARGEST_INVALID_SHARE = 0.01
@@ -37,6 +37,7 @@ def accumulate_moments(
     *,
     average: BandAverage | None = None,
     valid: npt.ArrayLike | None = None,
+    near_rest: npt.ArrayLike | None = None,
     blocks: int = 20,
     threads: int = 2,
     progress: Callable[[int, int], None] | None = None,
@@ -52,6 +53,8 @@ def accumulate_moments(
         average: Takes averages of the equations instead of the equations themselves, of ``x`` and ``y`` alike.
         valid: Which samples to use, boolean: shape (N,) for all joints alike, or (N, nv) for each joint's own row; None
             uses all. With ``average`` a joint's windows over samples that are not valid for it are left out.
+        near_rest: Which samples find which joint near rest, boolean, shape (N, nv); only with ``average``. Averages
+            that touch them are summed apart, as rows of a second set of joints (:data:`~casysid.moments.NEAR_REST`).
         blocks: How many blocks of near-equal length; fewer when there are fewer samples.
         threads: How many threads to use. The sums do not depend on it.
         progress: Called with the number of samples done and of all.
@@ -69,6 +72,11 @@ def accumulate_moments(
         raise ParameterError(f"moments: blocks must be at least 1; got {blocks}")
     groups = np.array_split(chosen, min(blocks, len(chosen)))
     widths = [len(columns) + 1 for columns in regressor.row_columns]
+    joints, rows_of = regressor.robot.dofs, regressor.row_columns
+    apart = None if near_rest is None or average is None else np.asarray(near_rest, dtype=bool)
+    if apart is not None:
+        joints, rows_of = (*joints, *(f"{joint}{NEAR_REST}" for joint in joints)), (*rows_of, *rows_of)
+        widths = [*widths, *widths]
     sums, counts = [np.zeros((len(groups), width, width)) for width in widths], np.zeros((len(groups), len(widths)))
     with threadpool_limits(1, user_api="blas"):  # threads of ours beside threads of BLAS would wait for each other
         if average is None:
@@ -86,20 +94,35 @@ def accumulate_moments(
             starts = np.array([group[0] for group in groups])
 
             def fill(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, WindowSums]:
-                rows = values if own is None else np.vstack([values, ~own[piece].T])
+                masks = [mask[piece].T for mask in (None if own is None else ~own, apart) if mask is not None]
+                rows = np.vstack([values, *masks]) if masks else values
                 block = np.searchsorted(starts, piece[0], side="right") - 1
                 return len(piece), windows[block].sums(piece, rows.T)
 
             filled = regressor.equations.map(fill, inputs, groups, threads)
             for block, parts in groupby(_reported(filled, len(chosen), progress), itemgetter(0)):
                 rows = windows[block].averages(part for _, part in parts).T
-                kept = None if own is None else rows[-len(widths) :].T <= LARGEST_INVALID_SHARE
-                counts[block], squares = _squares(rows[: sum(widths)], widths, kept)
+                counts[block], squares = _squares(*_sorted_rows(rows, widths, own is not None, apart is not None))
                 for total, own_square in zip(sums, squares, strict=True):
                     total[block] = own_square
     for total in sums:
         total.setflags(write=False)
-    return Moments(tuple(sums), regressor.row_columns, counts, regressor.names, regressor.robot.dofs)
+    return Moments(tuple(sums), rows_of, counts, regressor.names, joints)
+
+
+def _sorted_rows(
+    rows: Array, widths: Sequence[int], some_invalid: bool, apart: bool
+) -> tuple[Array, Sequence[int], Mask | None]:
+    """Averaged rows and masks as :func:`_squares` wants them: each joint's rows twice where those near rest are apart."""
+    joints = len(widths) // 2 if apart else len(widths)
+    values = rows[: sum(widths[:joints])]
+    shares = rows[len(values) :]
+    kept: Mask | None = shares[:joints].T <= LARGEST_INVALID_SHARE if some_invalid else None
+    if not apart:
+        return values, widths, kept
+    moving = shares[-joints:].T <= LARGEST_INVALID_SHARE
+    valid = np.ones_like(moving) if kept is None else kept
+    return np.vstack([values, values]), widths, np.hstack([valid & moving, valid & ~moving])
 
 
 def _reported(

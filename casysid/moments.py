@@ -27,6 +27,8 @@ from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError
 
 Indices = npt.NDArray[np.intp]
+NEAR_REST = " near rest"
+"""Ends the name of a joint's equations at times when it stands or turns round, where they are kept apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,6 +181,12 @@ class Moments:
         """Number of blocks of time."""
         return len(self.count)
 
+    @cached_property
+    def moving_rows(self) -> Indices:
+        """Of each joint's rows, the place of that joint's rows away from rest, shape (joints,)."""
+        places = {name: k for k, name in enumerate(self.joints)}
+        return np.array([places[name.removesuffix(NEAR_REST)] for name in self.joints], dtype=np.intp)
+
     @property
     def gram(self) -> Array:
         """The squares among all columns, shape (blocks, joints, p + 1, p + 1): for small problems only."""
@@ -192,6 +200,26 @@ class Moments:
     def of_joint(self, joint: int) -> tuple[Indices, Array]:
         """The w columns of a joint's row, and its squares, shape (blocks, w + 1, w + 1)."""
         return self.row_columns[joint], self.squares[joint]
+
+    def with_rows_only(self) -> Moments:
+        """Without the joints near rest of which there is no row."""
+        return self._with_joints(
+            [k for k, name in enumerate(self.joints) if self.count[:, k].any() or not name.endswith(NEAR_REST)]
+        )
+
+    def away_from_rest(self) -> Moments:
+        """Without the rows near rest that are kept apart."""
+        return self._with_joints([k for k, name in enumerate(self.joints) if not name.endswith(NEAR_REST)])
+
+    def _with_joints(self, kept: list[int]) -> Moments:
+        return dataclasses.replace(
+            self,
+            squares=tuple(self.squares[k] for k in kept),
+            row_columns=tuple(self.row_columns[k] for k in kept),
+            count=self.count[:, kept],
+            joints=tuple(self.joints[k] for k in kept),
+            noise=None if self.noise is None else tuple(self.noise[k] for k in kept),
+        )
 
     def select_blocks(self, blocks: npt.ArrayLike) -> Moments:
         """The given blocks only (indices or a boolean mask)."""

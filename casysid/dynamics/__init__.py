@@ -1,7 +1,7 @@
 """Symbolic kinematics and dynamics, the regressor with friction, and their evaluation in bulk."""
 
 from casysid.dynamics.bulk import Bulk
-from casysid.dynamics.drive import FrictionPart, Parameter
+from casysid.dynamics.drive import FrictionPart, Parameter, continued_positions
 from casysid.dynamics.friction import (
     DEFAULT_FRICTION,
     FRICTION_KINDS,
@@ -78,6 +78,7 @@ __all__ = [
     "Viscous",
     "build_dynamics",
     "build_regressor",
+    "continued_positions",
     "extend_regressor",
     "generate_c",
     "with_width",

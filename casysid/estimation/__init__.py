@@ -4,6 +4,7 @@ from casysid.errors import ParameterError
 from casysid.estimation.base import Estimate, Estimator, Status
 from casysid.estimation.bayesian import BayesianDenoising
 from casysid.estimation.cross_validation import cross_validated_energy
+from casysid.estimation.empirical_bayes import EmpiricalBayes
 from casysid.estimation.errors_in_variables import ErrorsInVariables
 from casysid.estimation.joint_factor_analysis import JointFactorAnalysis
 from casysid.estimation.lasso import LassoRegression
@@ -17,6 +18,7 @@ from casysid.estimation.total_least_squares import TotalLeastSquares
 ESTIMATORS: tuple[type[Estimator], ...] = (
     OrdinaryLeastSquares,
     WeightedLeastSquares,
+    EmpiricalBayes,
     Ridge,
     ErrorsInVariables,
     BayesianDenoising,
@@ -41,6 +43,7 @@ def estimator_by_name(name: str) -> Estimator:
 __all__ = [
     "ESTIMATORS",
     "BayesianDenoising",
+    "EmpiricalBayes",
     "ErrorsInVariables",
     "Estimate",
     "Estimator",

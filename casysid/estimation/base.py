@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -133,11 +134,31 @@ class Estimate:
         return np.sqrt(np.diag(self.covariance))
 
 
-class Estimator(Protocol):
-    """A method that turns moments into parameters."""
+Feasible = Callable[[Array, Array, float], Array]
+"""The possible parameters nearest to some, (p,), in a metric (p, p), given the residual energy in the metric's units."""
+
+
+class Estimator(ABC):
+    """A method that turns moments into parameters.
+
+    Attributes:
+        name: By which it is chosen.
+        needs_input_noise: Whether it wants to know what noise of the measured motion has added to the moments.
+    """
 
     name: ClassVar[str]
+    needs_input_noise: ClassVar[bool] = False
 
+    @abstractmethod
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """Parameters that explain the moments; what the data cannot see stays at ``prior`` (zeros when None)."""
-        ...
+
+    def estimate_among(self, moments: Moments, prior: Array | None, feasible: Feasible) -> Estimate:
+        """The same where only some parameters are possible; a method that has no use for that does not ask.
+
+        Args:
+            moments: Of the data.
+            prior: As for :meth:`estimate`.
+            feasible: Gives the possible parameters nearest to some.
+        """
+        return self.estimate(moments, prior)

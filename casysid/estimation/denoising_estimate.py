@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from casysid.arrays import Array
 from casysid.errors import ParameterError
-from casysid.estimation.base import Estimate
+from casysid.estimation.base import Estimate, Estimator
 from casysid.estimation.denoising import STARTS, Start, denoise
 from casysid.estimation.denoising_em import DenoisingModel, GammaPrior, State
 from casysid.estimation.denoising_fit import DenoisingFit, Scale
@@ -30,7 +30,7 @@ SETTLED = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
-class DenoisingEstimator(ABC):
+class DenoisingEstimator(Estimator):
     """Hyperparameters of both methods.
 
     Attributes:

@@ -37,7 +37,7 @@ REWEIGHTINGS = 3
 
 
 @dataclass(frozen=True)
-class ErrorsInVariables:
+class ErrorsInVariables(Estimator):
     """An estimator on denoised moments; without knowledge of the noise, the estimator itself.
 
     Attributes:

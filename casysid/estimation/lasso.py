@@ -14,7 +14,7 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import ParameterError
-from casysid.estimation.base import Estimate, Status
+from casysid.estimation.base import Estimate, Estimator, Status
 from casysid.estimation.cross_validation import cross_validate
 from casysid.estimation.selection import conditional_covariance
 from casysid.estimation.standardise import standardise
@@ -22,7 +22,7 @@ from casysid.moments import Moments, NormalEquations
 
 
 @dataclass(frozen=True, kw_only=True)
-class LassoRegression:
+class LassoRegression(Estimator):
     r"""Minimises :math:`\tfrac12 β^T S β - s^T β + λ \|β\|_1` in standardised columns, relative to the prior.
 
     Attributes:

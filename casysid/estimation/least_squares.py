@@ -8,14 +8,14 @@ from typing import ClassVar
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.estimation.base import Estimate, Status
+from casysid.estimation.base import Estimate, Estimator, Status
 from casysid.estimation.covariance import covariance_from_blocks
 from casysid.estimation.standardise import check_prior, solve_least_squares, standardise
 from casysid.moments import Moments
 
 
 @dataclass(frozen=True)
-class OrdinaryLeastSquares:
+class OrdinaryLeastSquares(Estimator):
     """All torque rows alike, rank-revealing; directions that the data do not see stay at the prior.
 
     Joints of large torque dominate: it is the field's plain baseline.
@@ -46,7 +46,7 @@ class OrdinaryLeastSquares:
 
 
 @dataclass(frozen=True)
-class WeightedLeastSquares:
+class WeightedLeastSquares(Estimator):
     """Every joint's rows divided by its residual standard deviation, which is re-estimated until it settles.
 
     Source: the field's iteratively re-weighted IDIM-WLS (Gautier 1997), with the weights by joint.

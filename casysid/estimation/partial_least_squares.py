@@ -14,7 +14,7 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import ParameterError
-from casysid.estimation.base import Estimate
+from casysid.estimation.base import Estimate, Estimator
 from casysid.estimation.cross_validation import cross_validate
 from casysid.estimation.selection import mean_variance
 from casysid.estimation.standardise import SPECTRUM_TOLERANCE, standardise
@@ -22,7 +22,7 @@ from casysid.moments import Moments, NormalEquations
 
 
 @dataclass(frozen=True, kw_only=True)
-class PartialLeastSquares:
+class PartialLeastSquares(Estimator):
     """Partial least squares with one target (PLS1) in standardised columns, relative to the prior.
 
     Attributes:

@@ -15,14 +15,14 @@ import numpy.typing as npt
 
 from casysid.arrays import Array
 from casysid.errors import ParameterError
-from casysid.estimation.base import Estimate, Status
+from casysid.estimation.base import Estimate, Estimator, Status
 from casysid.estimation.selection import conditional_covariance
 from casysid.estimation.standardise import standardise
 from casysid.moments import Moments, NormalEquations
 
 
 @dataclass(frozen=True, kw_only=True)
-class RelevanceRegression:
+class RelevanceRegression(Estimator):
     """ARD regression in standardised columns, relative to the prior.
 
     Attributes:

@@ -16,7 +16,7 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import ParameterError
-from casysid.estimation.base import Estimate, Status
+from casysid.estimation.base import Estimate, Estimator, Status
 from casysid.estimation.covariance import covariance_from_blocks
 from casysid.estimation.cross_validation import cross_validate
 from casysid.estimation.prior_covariance import prior_covariance
@@ -27,7 +27,7 @@ STRENGTHS: tuple[float, ...] = tuple(np.geomspace(1e-10, 1e1, 34).tolist())
 
 
 @dataclass(frozen=True)
-class Ridge:
+class Ridge(Estimator):
     """Weighted least squares with ``strength`` times the squared distance from the prior.
 
     Attributes:

@@ -15,14 +15,14 @@ import numpy as np
 
 from casysid.arrays import Array, frozen
 from casysid.errors import CasysidWarning, ParameterError
-from casysid.estimation.base import Estimate
+from casysid.estimation.base import Estimate, Estimator
 from casysid.estimation.selection import mean_variance
 from casysid.estimation.standardise import StandardisedProblem, seen_directions, standardise
 from casysid.moments import Moments, NormalEquations
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class TotalLeastSquares:
+class TotalLeastSquares(Estimator):
     r"""Minimises :math:`v^T S v / v^T D v` over ``v = [-θ, 1]``, with the noise covariance ``D`` of a row ``[x, y]``.
 
     Attributes:

@@ -7,47 +7,40 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from casysid.arrays import Array
+from casysid.dynamics import Regressor
 from casysid.errors import CasysidWarning, RecordingError
 from casysid.estimation import Estimate
 from casysid.identifiability import BaseParameters, excited_base_parameters, structural_base_parameters
-from casysid.identification.coulomb import choose_relative_width
-from casysid.identification.cutoff import COARSE_STEP, FINE_STEP, CutoffChoice, choose_cutoff
-from casysid.identification.delay import DelayChoice, choose_delay, given_delay
-from casysid.identification.equation_band import choose_equation_band
-from casysid.identification.excerpts import excerpts
-from casysid.identification.friction_choice import FrictionChoice, choose_friction
+from casysid.identification.choices import Choices
 from casysid.identification.friction_laws import friction_laws
-from casysid.identification.mistakes import Mistake, find_mistakes
+from casysid.identification.mistakes import find_mistakes
+from casysid.identification.noise_moments import with_noise
+from casysid.identification.passes import Passes
 from casysid.identification.prediction import torque_error
-from casysid.identification.problem import (
-    USUAL_WIDTH,
-    LinearProblem,
-    Mask,
-    build_problem,
-    make_motion,
-    position_smoothing,
-)
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
-from casysid.identification.standstill import choose_moving_only
-from casysid.identification.stretch_ends import choose_ends
-from casysid.identification.time_base import TimeBase, settle_time_base
-from casysid.identification.torque_gains import TorqueGains, settle_torque_gains
-from casysid.projection import ProjectionResult, build_projection, project
-from casysid.recording import Recording
+from casysid.identification.tuning.band import BandChoice, choose_band
+from casysid.identification.tuning.candidates import Candidates, final_regressor, gather_candidates, moments_of
+from casysid.identification.tuning.clock import choose_clock
+from casysid.identification.tuning.delay import choose_delay
+from casysid.identification.tuning.drive_gains import choose_drive_gains
+from casysid.identification.tuning.friction_selection import FrictionChoice, select_friction
+from casysid.moments import Moments
+from casysid.projection import ProjectionProblem, ProjectionResult, build_projection, possible_parameters, project
+from casysid.recording import Source
 from casysid.robot import Robot
-from casysid.signals import Motion, aligned
+from casysid.signals import InputNoise, Motion, aligned, motion_from_recording
+from casysid.threads import single_threaded
 from casysid.uncertainty import ParameterUncertainty, propagate
 
 PRIOR_BUDGET = 0.03
 """Share of the residual energy that may be spent on staying near the model file where the data hardly see."""
 Progress = Callable[[str, float], None]
-"""Told the stage and the share of it that is done."""
+"""Called with the stage and the share of it that is done."""
 
 
 def silent(stage: str, share: float) -> None:
@@ -60,37 +53,34 @@ class Preparation:
 
     Attributes:
         robot: The robot.
-        time_base: What was found of the recordings' clock.
-        mistakes: What in the recordings contradicts the model file.
-        cutoff: The low-pass and why.
-        delay: How late the torque is, and what was taken out of all recordings.
-        friction: What the data added to the friction that was asked for.
-        torque_gains: Of the joints relative to each other, and why.
-        problem: Regressor, motions and moments of the fitted recordings.
+        choices: What was chosen on the way.
+        regressor: With the friction that was chosen.
+        moments: Of the fitted recordings, with what noise added if some method needs it.
+        motions: Of the fitted recordings.
         held_out: Motions that are only predicted.
+        input_noise: Of the measured motion; None where no method needs it, or it is not known.
         structural: Base parameters of the mechanism.
         seconds: Wall time by stage.
     """
 
     robot: Robot
-    time_base: TimeBase
-    mistakes: tuple[Mistake, ...]
-    cutoff: CutoffChoice
-    delay: DelayChoice
-    friction: FrictionChoice
-    torque_gains: TorqueGains
-    problem: LinearProblem
+    choices: Choices
+    regressor: Regressor
+    moments: Moments
+    motions: tuple[Motion, ...]
     held_out: tuple[Motion, ...]
+    input_noise: InputNoise | None
     structural: BaseParameters
     seconds: dict[str, float]
 
 
+@single_threaded()
 def identify(
     robot: Robot,
-    recordings: Recording | Sequence[Recording],
+    recordings: Source | Sequence[Source],
     settings: Settings | None = None,
     *,
-    held_out: Sequence[Recording] = (),
+    held_out: Sequence[Source] = (),
     progress: Progress = silent,
 ) -> IdentificationResult:
     """Identify a robot's parameters from recordings.
@@ -100,7 +90,7 @@ def identify(
         recordings: What is fitted.
         settings: Hyperparameters; the defaults let the data decide.
         held_out: Recordings that are only predicted.
-        progress: Told the stage and the share done.
+        progress: Called with the stage and the share done.
 
     Raises:
         RecordingError: No recordings.
@@ -112,161 +102,189 @@ def identify(
     )
 
 
+@single_threaded()
 def prepare(
     robot: Robot,
-    recordings: Recording | Sequence[Recording],
+    recordings: Source | Sequence[Source],
     settings: Settings,
     *,
-    held_out: Sequence[Recording] = (),
+    held_out: Sequence[Source] = (),
+    noise_too: bool = False,
     progress: Progress = silent,
 ) -> Preparation:
-    """Settle cut-off, delay and friction's sharpness, and take the moments; arguments as in :func:`identify`."""
-    fitted = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+    """Choose what the data decide, and take the moments.
+
+    Args:
+        robot: As for :func:`identify`.
+        recordings: Likewise.
+        settings: Likewise.
+        held_out: Likewise.
+        noise_too: Whether what noise adds to the moments is wanted although ``settings.method`` does not need it.
+        progress: Likewise.
+    """
+    fitted = (recordings,) if isinstance(recordings, Source) else tuple(recordings)
     if not fitted:
         raise RecordingError("identify: at least one recording to fit is needed; got none")
     clock = _Clock()
     fitted, held_out = (tuple(one.flipped(settings.flip) for one in several) for several in (fitted, held_out))
-    time_base = settle_time_base(robot, fitted, settings)
-    if time_base.reason:
-        warnings.warn(time_base.reason, CasysidWarning, stacklevel=3)
-    settings = dataclasses.replace(settings, quasi_static=time_base.quasi_static)
-    fitted = tuple(recording.with_time_scaled(time_base.scale) for recording in fitted)
-    unseen = tuple(recording.with_time_scaled(time_base.scale) for recording in held_out)
-    mistakes = find_mistakes(robot, fitted)
-    for mistake in mistakes:
-        warnings.warn(mistake.sentence, CasysidWarning, stacklevel=3)
-    cutoff, delay, width, moving_only, friction = _settle(robot, fitted, settings, progress)
-    fitted, unseen = (tuple(aligned(one, delay.seconds) for one in several) for several in (fitted, unseen))
+    progress("tuning", 0.0)
+    chosen = _choose(robot, fitted, settings, progress)
     clock.lap("tuning")
     progress("moments", 0.0)
-    build = partial(build_problem, robot, fitted, relative_width=width, moving_only=moving_only)
-    problem = build(cutoff.fitted, friction.settings)
-    seen = problem if cutoff.equations is None else build(cutoff.cutoff, friction.settings, quick=True)
-    gains = settle_torque_gains(seen.moments, problem.regressor.parameters, settings)
-    if gains.found:
-        warnings.warn(gains.reason, CasysidWarning, stacklevel=3)
-        problem = build(cutoff.fitted, dataclasses.replace(friction.settings, torque_gains=tuple(gains.values)))
-    predicted = tuple(
-        make_motion(robot, one, cutoff.fitted, smoothing=position_smoothing(one, cutoff.fitted, settings))
-        for one in unseen
-    )
-    structural = structural_base_parameters(problem.regressor)
+    regressor, moments, passes = chosen.regressor, chosen.moments, chosen.passes
+    noise = None
+    if noise_too or settings.method.needs_input_noise:
+        moments, noise = with_noise(moments, regressor, passes, settings.input_noise)
+    scale, delay, band = chosen.choices.clock.scale, chosen.choices.delay, chosen.choices.band
+    unseen = [aligned(one.with_time_scaled(scale), delay.seconds) for one in held_out]
+    predicted = tuple(motion_from_recording(robot, one, band.smoothing) for one in unseen)
+    structural = structural_base_parameters(regressor)
     clock.lap("moments")
     progress("moments", 1.0)
     return Preparation(
-        robot, time_base, mistakes, cutoff, delay, friction, gains, problem, predicted, structural, clock.laps
+        robot, chosen.choices, regressor, moments, passes.motions, predicted, noise, structural, clock.laps
     )
 
 
+@single_threaded()
 def solve(preparation: Preparation, settings: Settings, *, progress: Progress = silent) -> IdentificationResult:
     """Estimate, make consistent, and check: everything after the data have been read."""
-    problem, regressor = preparation.problem, preparation.problem.regressor
+    regressor, moments, prior = preparation.regressor, preparation.moments, preparation.regressor.prior
     clock = _Clock()
     progress("estimate", 0.0)
-    estimate = settings.method.estimate(problem.moments, regressor.prior)
+    problem = _projection_problem(regressor, settings)
+    if problem is None:
+        estimate = settings.method.estimate(moments, prior)
+    else:
+        estimate = settings.method.estimate_among(moments, prior, possible_parameters(problem, prior))
     clock.lap("estimate")
     progress("estimate", 1.0)
-    projection, uncertainty = _project(problem, estimate, settings, progress)
+    progress("projection", 0.0)
+    projection, uncertainty = _project(preparation, problem, estimate)
     clock.lap("projection")
+    progress("projection", 1.0)
     progress("check", 0.0)
     parameters = estimate.parameters if projection is None else projection.parameters
-    judged, band = preparation.held_out or problem.motions, preparation.cutoff.cutoff
+    band = preparation.choices.band.errors
+    judged = preparation.held_out or preparation.motions
     result = IdentificationResult(
         robot=preparation.robot,
         settings=settings,
-        time_base=preparation.time_base,
-        mistakes=preparation.mistakes,
-        cutoff=preparation.cutoff,
-        delay=preparation.delay,
-        friction=preparation.friction,
-        torque_gains=preparation.torque_gains,
+        choices=preparation.choices,
         regressor=regressor,
-        moments=problem.moments,
+        moments=moments,
         estimate=estimate,
         projection=projection,
         uncertainty=uncertainty,
         structural=preparation.structural,
-        excited=excited_base_parameters(regressor, problem.moments, estimate.noise_std),
+        excited=excited_base_parameters(regressor, moments, estimate.noise_std),
         unconstrained=torque_error(regressor, estimate.parameters, judged, band),
-        train=torque_error(regressor, parameters, problem.motions, band),
+        train=torque_error(regressor, parameters, preparation.motions, band),
         held_out=torque_error(regressor, parameters, preparation.held_out, band) if preparation.held_out else None,
-        file=torque_error(regressor, regressor.prior, judged, band),
-        train_motions=problem.motions,
+        file=torque_error(regressor, prior, judged, band),
+        train_motions=preparation.motions,
         held_out_motions=preparation.held_out,
-        input_noise=problem.input_noise,
+        input_noise=preparation.input_noise,
         seconds={**preparation.seconds, **clock.laps},
     )
     progress("check", 1.0)
     return result
 
 
-def _project(
-    problem: LinearProblem, estimate: Estimate, settings: Settings, progress: Progress
-) -> tuple[ProjectionResult | None, ParameterUncertainty]:
-    """The nearest consistent parameters in the estimate's own metric, None if not asked for; and how sure they are."""
-    regressor, moments = problem.regressor, problem.moments
+def _projection_problem(regressor: Regressor, settings: Settings) -> ProjectionProblem | None:
+    """What parameters have to obey; None if nothing is asked for."""
     if settings.consistency is None:
-        return None, propagate(estimate, moments, regressor.parameters)
-    progress("projection", 0.0)
-    projection = build_projection(
+        return None
+    return build_projection(
         regressor.parameters,
         consistency=settings.consistency,
         knowledge=(*settings.knowledge, *friction_laws(regressor)),
         prior_budget=PRIOR_BUDGET,
     )
+
+
+def _project(
+    preparation: Preparation, problem: ProjectionProblem | None, estimate: Estimate
+) -> tuple[ProjectionResult | None, ParameterUncertainty]:
+    """The nearest consistent parameters in the estimate's own metric, None if not asked for; and how sure they are."""
+    regressor, moments = preparation.regressor, preparation.moments
+    if problem is None:
+        return None, propagate(estimate, moments, regressor.parameters)
     energy = moments.pooled(estimate.noise_std**-2.0).residual_energy(estimate.parameters)
     prior = regressor.prior
-    found = project(projection, estimate.parameters, estimate.metric, prior, residual_energy=energy)
-    uncertainty = propagate(estimate, moments, regressor.parameters, projection, found, prior, residual_energy=energy)
-    progress("projection", 1.0)
+    found = project(problem, estimate.parameters, estimate.metric, prior, residual_energy=energy)
+    uncertainty = propagate(estimate, moments, regressor.parameters, problem, found, prior, residual_energy=energy)
     return found, uncertainty
 
 
-def _settle(
-    robot: Robot, recordings: Sequence[Recording], settings: Settings, progress: Progress
-) -> tuple[CutoffChoice, DelayChoice, Array, Mask, FrictionChoice]:
-    """Ends, cut-off, sharpness of Coulomb friction, stands to leave out, each given the others; roughly, then finely.
+@dataclass(frozen=True, eq=False)
+class _Chosen:
+    """Choices, with the regressor, the moments and the passes that they led to."""
 
-    The cut-off is chosen with all stands in, so that all candidates are judged by the same equations. The second time
-    the torque's delay has been taken out. Further kinds of friction are chosen last. Of long recordings, excerpts are
-    looked at, but for these.
-    """
-    width, moving_only = np.full(robot.nv, USUAL_WIDTH), np.zeros(robot.nv, dtype=bool)
-    delay, parts, asked = given_delay(robot, 0.0), excerpts(recordings), settings
-    for pace, step in (("rough", COARSE_STEP), ("fine", FINE_STEP)):
-        fitted = [aligned(recording, delay.seconds) for recording in parts]
-        settings = dataclasses.replace(settings, ends=choose_ends(robot, fitted, asked))
-        cutoff = choose_cutoff(
-            robot,
-            fitted,
-            settings,
-            relative_width=width,
-            step=step,
-            progress=lambda share, pace=pace: progress(f"cut-off, {pace}", share),  # type: ignore[misc]
-        )
-        moving_only = choose_moving_only(robot, fitted, cutoff.cutoff, settings, width)
-        width = choose_relative_width(
-            robot,
-            fitted,
-            cutoff.cutoff,
-            settings,
-            moving_only,
-            lambda share, pace=pace: progress(f"friction, {pace}", share),  # type: ignore[misc]
-        )
-        if pace == "rough":
-            progress("delay", 0.0)
-            delay = choose_delay(robot, parts, cutoff.cutoff, settings, width)
-            progress("delay", 1.0)
-    friction = FrictionChoice(settings)
-    if settings.choose_friction:
-        progress("friction, kinds", 0.0)
-        whole = [aligned(recording, delay.seconds) for recording in recordings]
-        friction = choose_friction(robot, whole, cutoff.cutoff, settings, width, moving_only)
-        if friction.chosen:
-            width = choose_relative_width(robot, fitted, cutoff.cutoff, friction.settings, moving_only)
-        progress("friction, kinds", 1.0)
-    cutoff = choose_equation_band(robot, fitted, cutoff, friction.settings, width, moving_only)
-    return cutoff, delay, width, moving_only, friction
+    choices: Choices
+    regressor: Regressor
+    moments: Moments
+    passes: Passes
+
+
+def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, progress: Progress) -> _Chosen:
+    """Band, clock, delay, friction and gains, each given those before; recordings are smoothed anew for a new clock."""
+    band = choose_band(recordings, settings.cutoff)
+    passes, candidates = _gather(robot, recordings, band, settings)
+    progress("tuning", 0.3)
+    clock = choose_clock(passes, candidates, settings.time_scale, settings.quasi_static)
+    if clock.reason:
+        warnings.warn(clock.reason, CasysidWarning, stacklevel=4)
+    settings = dataclasses.replace(settings, quasi_static=clock.quasi_static)
+    work = [passes]
+    if clock.scale != 1.0 or clock.quasi_static:
+        recordings = tuple(one.with_time_scaled(clock.scale) for one in recordings)
+        band = choose_band(recordings, settings.cutoff)
+        passes, candidates = _gather(robot, recordings, band, settings)
+        work.append(passes)
+    mistakes = find_mistakes(robot, passes.sparse_motions, band.cutoff)
+    for mistake in mistakes:
+        warnings.warn(mistake.sentence, CasysidWarning, stacklevel=4)
+    progress("tuning", 0.5)
+    delay = choose_delay(passes, candidates.base, settings.delay)
+    if not delay.is_none:
+        passes, candidates = _gather(robot, [aligned(one, delay.seconds) for one in recordings], band, settings)
+        work.append(passes)
+    progress("tuning", 0.7)
+    friction = select_friction(candidates, settings) if candidates.proposals else FrictionChoice(settings)
+    regressor = final_regressor(candidates, settings, [proposal for proposal, _ in friction.taken])
+    moments = moments_of(regressor, candidates, friction.taken)
+    gains = choose_drive_gains(
+        moments, regressor.parameters, settings.consistency, settings.knowledge, settings.torque_gains
+    )
+    if gains.found:
+        warnings.warn(gains.reason, CasysidWarning, stacklevel=4)
+        settings = dataclasses.replace(settings, torque_gains=tuple(gains.values.tolist()))
+        regressor = final_regressor(candidates, settings, [proposal for proposal, _ in friction.taken])
+        moments = passes.moments(regressor)
+    friction = dataclasses.replace(
+        friction,
+        settings=dataclasses.replace(settings, friction=regressor.friction, couplings=regressor.couplings),
+    )
+    choices = Choices(
+        band=band,
+        width=passes.width if settings.coulomb_width is None else np.full(robot.nv, settings.coulomb_width),
+        clock=clock,
+        mistakes=mistakes,
+        delay=delay,
+        friction=friction,
+        gains=gains,
+        smoothings=sum(one.smoothings for one in work),
+        passes=sum(one.passes for one in work),
+    )
+    return _Chosen(choices, regressor, moments, passes)
+
+
+def _gather(
+    robot: Robot, recordings: Sequence[Source], band: BandChoice, settings: Settings
+) -> tuple[Passes, Candidates]:
+    passes = Passes(robot, recordings, band, blocks=settings.blocks, threads=settings.threads)
+    return passes, gather_candidates(passes, settings)
 
 
 class _Clock:

@@ -1,4 +1,8 @@
-"""How well parameters predict torque on a recording."""
+"""How well parameters predict torque on a recording, in a band that no choice moves.
+
+Measured and predicted torque are averaged by the same short windows, a low-pass at a cut-off that comes of the motion
+alone, away from the ends of stretches of time; and compared once more as they are, without any low-pass.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,7 @@ import numpy as np
 
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
-from casysid.signals import Motion, low_passed
+from casysid.signals import BandAverage, Motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,11 +22,11 @@ class TorqueError:
 
     Attributes:
         samples: Number of instants.
-        relative: ``‖F(τ - τ̂)‖ / ‖F τ‖`` over all joints, ``F`` the zero-phase low-pass: measured and predicted torque
-            seen in the same band.
-        relative_unfiltered: ``‖τ - τ̂‖ / ‖τ‖``, the torque as logged: what no low-pass has flattered.
+        relative: ``‖F(τ - τ̂)‖ / ‖F τ‖`` over all joints, ``F`` the average: measured and predicted torque in one band.
+        relative_unfiltered: ``‖τ - τ̂‖ / ‖τ‖``, the torque as logged.
         rmse: Root mean square of ``F(τ - τ̂)`` by joint, shape (nv,), [N m].
         relative_by_joint: ``‖F(τ_j - τ̂_j)‖ / ‖F τ_j‖``, shape (nv,).
+        times: Middles of each motion's windows, shape (N,) each, [s].
         measured: ``F τ`` of each motion, shape (N, nv) each.
         predictions: ``F τ̂`` of each motion, shape (N, nv) each.
     """
@@ -32,6 +36,7 @@ class TorqueError:
     relative_unfiltered: float
     rmse: Array
     relative_by_joint: Array
+    times: tuple[Array, ...]
     measured: tuple[Array, ...]
     predictions: tuple[Array, ...]
 
@@ -40,25 +45,37 @@ def torque_error(
     regressor: Regressor, parameters: Array, motions: Sequence[Motion], cutoff: float | None
 ) -> TorqueError:
     """Predict each motion's torque and compare, below ``cutoff`` [Hz] and as logged."""
-    raw = [regressor.predict(parameters, motion.q, motion.v, motion.a) for motion in motions]
-    measured = tuple(frozen(_seen(motion, motion.tau, cutoff)) for motion in motions)
-    predicted = tuple(frozen(_seen(motion, tau, cutoff)) for motion, tau in zip(motions, raw, strict=True))
-    residual = np.linalg.norm(np.concatenate(measured) - np.concatenate(predicted), axis=0)
+    missed = felt = 0.0
+    times, measured, predictions = [], [], []
+    for motion in motions:
+        predicted = regressor.predict(parameters, motion.q, motion.v, motion.a, time=motion.time)
+        inner = motion.settled if motion.settled.any() else np.ones(len(motion), dtype=bool)
+        missed += float(np.sum((motion.tau - predicted)[inner] ** 2))
+        felt += float(np.sum(motion.tau[inner] ** 2))
+        weights = averages_of(motion, cutoff)
+        for kept, values in ((times, motion.time), (measured, motion.tau), (predictions, predicted)):
+            kept.append(frozen(values[inner] if weights is None else weights @ values[inner]))
+    difference = np.concatenate(measured) - np.concatenate(predictions)
+    residual = np.linalg.norm(difference, axis=0)
     size = np.linalg.norm(np.concatenate(measured), axis=0)
-    logged = np.concatenate([motion.tau for motion in motions])
     return TorqueError(
-        samples=len(logged),
+        samples=sum(map(len, motions)),
         relative=_ratio(np.linalg.norm(residual), np.linalg.norm(size)),
-        relative_unfiltered=_ratio(np.linalg.norm(logged - np.concatenate(raw)), np.linalg.norm(logged)),
-        rmse=frozen(residual / np.sqrt(len(logged))),
+        relative_unfiltered=_ratio(np.sqrt(missed), np.sqrt(felt)),
+        rmse=frozen(residual / np.sqrt(max(len(difference), 1))),
         relative_by_joint=frozen([_ratio(e, s) for e, s in zip(residual, size, strict=True)]),
-        measured=measured,
-        predictions=predicted,
+        times=tuple(times),
+        measured=tuple(measured),
+        predictions=tuple(predictions),
     )
 
 
-def _seen(motion: Motion, tau: Array, cutoff: float | None) -> Array:
-    return tau if cutoff is None else low_passed(motion.time, tau, cutoff)
+def averages_of(motion: Motion, cutoff: float | None):  # type: ignore[no-untyped-def]  # SciPy's sparse arrays have none
+    """Sparse weights of the averages over a motion's settled samples; None without a cut-off."""
+    if cutoff is None:
+        return None
+    inner = np.flatnonzero(motion.settled) if motion.settled.any() else np.arange(len(motion))
+    return BandAverage(motion.time, cutoff).weights(inner)
 
 
 def _ratio(error: float | np.floating, size: float | np.floating) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from casysid.dynamics import DEFAULT_FRICTION, Coupling, FrictionKind
 from casysid.errors import ParameterError
-from casysid.estimation import Estimator, Ridge
+from casysid.estimation import EmpiricalBayes, Estimator
 from casysid.inertia import Consistency
 from casysid.projection import Knowledge
 from casysid.signals import NoiseLevels
@@ -23,25 +23,23 @@ class Settings:
         consistency: Physical laws that the parameters are made to obey; None leaves the estimate as it is.
         knowledge: What is known beside the data, such as a total mass; used together with ``consistency``.
         flip: Columns of the recordings whose signs are turned, as :meth:`casysid.recording.Recording.flipped` has it.
-        cutoff: Low-pass cut-off [Hz]; None lets the data choose.
+        cutoff: Of the equations' low-pass [Hz]; None derives it from the motion.
         delay: By how much the torque's time stamps are late against the positions' [s]; None takes it from the data.
         friction: Kinds of friction and drive columns of every joint.
         choose_friction: Whether the data may add kinds of friction, joint by joint, and couplings of neighbours; only
             with time stamps.
-        coulomb_width: Velocity within which Coulomb's smooth sign turns [rad/s, m/s]; None takes it from the velocity's
-            noise.
+        coulomb_width: Velocity within which Coulomb's smooth sign turns [rad/s, m/s]; None takes a share of each joint's
+            root mean square velocity.
         couplings: Transmissions that link joints, such as a wrist driven by two motors.
         time_scale: Time stamps times this are seconds; None looks whether inertial torques contradict the clock.
         quasi_static: Torques hold no inertial part, gravity and friction explain them; None lets the data decide.
-        ends: Whether equations at the ends of stretches of time count, where smoothing knows one side only; None lets
-            the data decide.
         input_noise: What is known of the noise of the measured motion; by default the positions' is found in the data.
         torque_gains: Measured torque over true torque of every degree of freedom; None fits them if needed.
         blocks: Blocks of time by which moments are kept: the folds of cross-validation and the unit of standard errors.
         threads: Threads of the regressor's evaluation.
     """
 
-    method: Estimator = field(default_factory=Ridge)
+    method: Estimator = field(default_factory=EmpiricalBayes)
     consistency: Consistency | None = Consistency.FULL
     knowledge: tuple[Knowledge, ...] = ()
     flip: tuple[str, ...] = ()
@@ -53,7 +51,6 @@ class Settings:
     couplings: tuple[Coupling, ...] = ()
     time_scale: float | None = None
     quasi_static: bool | None = None
-    ends: bool | None = None
     input_noise: NoiseLevels = field(default_factory=NoiseLevels)
     torque_gains: tuple[float, ...] | None = None
     blocks: int = 20

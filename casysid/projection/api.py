@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 
+from casysid.arrays import Array
 from casysid.errors import ParameterError
 from casysid.moments import NormalEquations
 from casysid.nlp import Progress
+from casysid.projection.certificate import USUAL_WEIGHT, certify
 from casysid.projection.layout import as_vector
 from casysid.projection.misfit import misfit_of_equations, misfit_of_estimate
 from casysid.projection.problem import ProjectionProblem
@@ -68,3 +72,23 @@ def constrained_least_squares(
             f"projection: the moments have {equations.xx.shape[0]} columns, the problem {len(problem.layout)}"
         )
     return solve_task(task_of(problem, misfit_of_equations(equations), prior), progress)
+
+
+def possible_parameters(
+    problem: ProjectionProblem, prior: npt.ArrayLike | None = None
+) -> Callable[[Array, Array, float], Array]:
+    """A function that gives the consistent parameters nearest to some, ``(θ, G, residual energy) -> θ``.
+
+    By the convex solver alone, for searches that project often; where that has no answer, parameters stay as they are.
+
+    Args:
+        problem: From :func:`build_projection`.
+        prior: As for :func:`project`.
+    """
+
+    def nearest(estimate: Array, metric: Array, residual_energy: float) -> Array:
+        task = task_of(problem, misfit_of_estimate(metric, estimate, residual_energy), prior)
+        certificate = certify(task, USUAL_WEIGHT)
+        return estimate if certificate is None else task.frame.transform @ certificate.scaled
+
+    return nearest

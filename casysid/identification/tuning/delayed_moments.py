@@ -19,7 +19,6 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
 from casysid.moments import Moments
-from casysid.recording import Recording
 from casysid.signals import BandAverage, Motion
 
 NODES = 13
@@ -32,7 +31,7 @@ SAMPLES_PER_PERIOD = 20
 
 
 @dataclass(frozen=True, eq=False)
-class ShiftedMoments:
+class DelayedMoments:
     """Sums of ``r rᵀ``, ``r = [x, y_1 .. y_K]``, by block of time and joint, ``y_k`` the torque ``nodes[k]`` later.
 
     Attributes:
@@ -86,43 +85,43 @@ def node_delays(centre: float, cutoff: float) -> Array:
     return np.asarray(centre + (np.arange(NODES) - (NODES - 1) / 2) * NODE_SPACING / cutoff)
 
 
-def sum_shifted_moments(
+def sum_delayed_moments(
     regressor: Regressor,
     motions: Sequence[Motion],
-    recordings: Sequence[Recording],
+    torques: Sequence[Motion],
     nodes: Array,
     cutoff: float,
     *,
     blocks: int = 20,
     threads: int = 2,
-) -> ShiftedMoments:
+) -> DelayedMoments:
     """One pass over all recordings.
 
     Args:
         regressor: Gives the rows ``x``.
         motions: The smoothed recordings, possibly at fewer samples.
-        recordings: Whose torque is taken.
+        torques: The same at all samples, of which the torque is taken.
         nodes: Delays [s], shape (K,).
         cutoff: Of the equations' average [Hz].
         blocks: Blocks of time of each recording.
         threads: Threads of the regressor's evaluation.
     """
     parts = [
-        _sum_one(regressor, motion, _thinned(recording, cutoff), nodes, cutoff, blocks, threads)
-        for motion, recording in zip(motions, recordings, strict=True)
+        _sum_one(regressor, motion, _thinned(whole, cutoff), nodes, cutoff, blocks, threads)
+        for motion, whole in zip(motions, torques, strict=True)
     ]
     squares = tuple(frozen(np.concatenate(own)) for own in zip(*(sums for sums, _ in parts), strict=True))
     count = np.concatenate([rows for _, rows in parts])
-    return ShiftedMoments(squares, np.repeat(count[:, None], regressor.robot.nv, axis=1), frozen(nodes), regressor)
+    return DelayedMoments(squares, np.repeat(count[:, None], regressor.robot.nv, axis=1), frozen(nodes), regressor)
 
 
-def _thinned(recording: Recording, cutoff: float) -> tuple[Array, Array]:
+def _thinned(motion: Motion, cutoff: float) -> tuple[Array, Array]:
     """Time and torque, averaged over neighbours down to a rate that is plenty for the cut-off."""
-    assert recording.time is not None
-    stride = max(int(recording.rate / (SAMPLES_PER_PERIOD * cutoff)), 1)
-    whole = len(recording) // stride * stride
-    time = recording.time[:whole].reshape(-1, stride).mean(axis=1)
-    return time, recording.torque[:whole].reshape(-1, stride, len(recording.dofs)).mean(axis=1)
+    rate = (len(motion) - 1) / max(float(motion.time[-1] - motion.time[0]), np.finfo(np.float64).tiny)
+    stride = max(int(rate / (SAMPLES_PER_PERIOD * cutoff)), 1)
+    whole = len(motion) // stride * stride
+    time = motion.time[:whole].reshape(-1, stride).mean(axis=1)
+    return time, motion.tau[:whole].reshape(len(time), stride, -1).mean(axis=1)
 
 
 def _sum_one(
@@ -139,7 +138,8 @@ def _sum_one(
     inside = np.arange(*ends)
     sizes = [len(columns) + len(nodes) for columns in regressor.row_columns]
     sums, count = [np.zeros((blocks, size, size)) for size in sizes], np.zeros(blocks)
-    inputs, _ = regressor.equations.check((motion.q, motion.v, motion.a, motion.tau))
+    histories = regressor.histories(motion.q, motion.time)
+    inputs, _ = regressor.equations.check((motion.q, motion.v, motion.a, motion.tau, *histories))
     starts = np.cumsum([0, *(len(columns) + 1 for columns in regressor.row_columns)])
 
     def square(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, list[Array]]:

@@ -23,9 +23,10 @@ from casysid.dynamics import Parameter
 from casysid.errors import SolverError
 from casysid.estimation import Ridge
 from casysid.estimation.cross_validation import contiguous_folds
-from casysid.identification.settings import Settings
+from casysid.identification.tuning.held_out import FOLDS
+from casysid.identification.tuning.log_score import EXPLAINED, HeldOutScore, simplest_within_one_error
 from casysid.inertia import Consistency
-from casysid.moments import Moments, NormalEquations
+from casysid.moments import Indices, Moments, NormalEquations
 from casysid.projection import (
     Knowledge,
     LinearKnowledge,
@@ -35,17 +36,17 @@ from casysid.projection import (
 )
 
 COSTLY = 1.05
-"""Gains are looked for when consistency, or gains fixed at one, raise the torque's error by so much."""
-WORTHWHILE = 0.95
-"""And kept when they bring the error on time left out below this fraction."""
-USUAL, TOLL = 0.3, 0.01
+"""Gains are looked for when consistency, or gains fixed at one, raise the torque's error by so much: a practical gain."""
+SMALLEST = 0.1
+"""Gains that are all nearer to one than this are none: torque constants are known no better."""
+USUAL, PRICE = 0.3, 0.01
 """A gain that is off by so much (in its logarithm) must lower the residual energy by this share."""
-FOLDS, STEPS, LONGEST_STEP, SETTLED = 3, 8, 0.3, 3e-3
-PRIOR_BUDGET = 0.03
+STEPS, LONGEST_STEP, SETTLED = 8, 0.3, 3e-3
+"""Of Gauss-Newton: how many, how far in a logarithm, and the relative fall of the cost that ends it."""
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueGains:
+class DriveGains:
     """Measured torque over true torque of every joint, the geometric mean being one.
 
     Attributes:
@@ -68,62 +69,91 @@ class TorqueGains:
         return bool((self.error > 0.0).any())
 
 
-def no_gains(dofs: int) -> TorqueGains:
+def no_gains(dofs: int) -> DriveGains:
     """All ones."""
-    return TorqueGains(np.ones(dofs), np.zeros(dofs))
+    return DriveGains(np.ones(dofs), np.zeros(dofs))
 
 
-def settle_torque_gains(moments: Moments, parameters: Sequence[Parameter], settings: Settings) -> TorqueGains:
-    """Gains that the data call for; ones where the search for them finds no answer that can be stood by.
+def choose_drive_gains(
+    moments: Moments,
+    parameters: Sequence[Parameter],
+    consistency: Consistency | None,
+    knowledge: Sequence[Knowledge] = (),
+    given: Sequence[float] | None = None,
+) -> DriveGains:
+    """Gains that the data call for; ones where the search for them finds no usable answer.
 
     Args:
         moments: Of the regressor's columns.
         parameters: The regressor's columns.
-        settings: Consistency and knowledge; gains given there are taken as they are.
+        consistency: Laws of bodies; without them no gain can be told from the parameters.
+        knowledge: What is known beside.
+        given: Taken as they are.
     """
-    dofs = len(moments.joints)
-    if settings.torque_gains is not None:
-        return TorqueGains(np.array(settings.torque_gains), np.zeros(dofs), "given")
-    if settings.consistency is None or dofs < 2:
+    moving = moments.away_from_rest()
+    dofs = len(moving.joints)
+    if given is not None:
+        return DriveGains(np.array(given), np.zeros(dofs), "given")
+    if consistency is None or dofs < 2:
         return no_gains(dofs)
     try:
-        return _search(moments, parameters, settings, settings.consistency)
+        return _search(moving, parameters, consistency, knowledge)
     except SolverError:
         return no_gains(dofs)
 
 
 def _search(
-    moments: Moments, parameters: Sequence[Parameter], settings: Settings, consistency: Consistency
-) -> TorqueGains:
+    moments: Moments, parameters: Sequence[Parameter], consistency: Consistency, knowledge: Sequence[Knowledge]
+) -> DriveGains:
     """Gains, if they are needed and predict better.
 
     Raises:
         SolverError: No consistent parameters were found on the way.
     """
     dofs = len(moments.joints)
-    fit = _GainFit(moments.joints, tuple(parameters), consistency, settings.knowledge, _weights(moments, parameters))
-    if not fit.is_suspicious(moments):
+    weights = _weights(moments, parameters)
+    fit = _GainFit(moments.joints, tuple(parameters), consistency, tuple(knowledge), weights)
+    if (weights > 0.0).sum() < 2 or not fit.is_suspicious(moments):
         return no_gains(dofs)
     gains, _ = fit.gains(moments)
-    without, with_gains, values = 0.0, 0.0, []
-    for held_out in contiguous_folds(moments.blocks, FOLDS):
-        training = moments.select_blocks(np.setdiff1d(np.arange(moments.blocks), held_out))
-        test = moments.select_blocks(held_out)
-        own, parameters_with = fit.gains(training, gains, steps=2)
-        without += fit.error(test, fit.consistent(training)) ** 2
-        with_gains += fit.error(scaled(test, own), parameters_with) ** 2
-        values.append(own)
-    gain = math.sqrt(with_gains / without)
-    if gain > WORTHWHILE:
+    voting = weights > 0.0
+    if np.abs(gains[voting] - 1.0).max() < SMALLEST:
         return no_gains(dofs)
-    spread = (FOLDS - 1) / FOLDS * np.sum((np.array(values) - np.mean(values, axis=0)) ** 2, axis=0)
+    folds = contiguous_folds(moments.blocks, FOLDS)
+    values, without, with_gains = [], [], []
+    for fold in folds:
+        training = moments.select_blocks(np.setdiff1d(np.arange(moments.blocks), fold))
+        test = moments.select_blocks(fold)
+        own, parameters_with = fit.gains(training, gains, steps=2)
+        without.append(_energies(test, training, fit.consistent(training)))
+        with_gains.append(_energies(scaled(test, own), scaled(training, own), parameters_with))
+        values.append(own)
+    scores = [_held_out_score(moments, folds, energies) for energies in (without, with_gains)]
+    if simplest_within_one_error(scores) == 0:
+        return no_gains(dofs)
+    spread = (len(folds) - 1) / len(folds) * np.sum((np.array(values) - np.mean(values, axis=0)) ** 2, axis=0)
     words = ", ".join(f"{dof} {value:.2f}" for dof, value in zip(moments.joints, gains, strict=True))
-    return TorqueGains(
+    return DriveGains(
         gains,
         np.sqrt(spread),
         f"no bodies make these torques in the proportions logged; with gains of {words} (measured over true torque, "
-        f"geometric mean one) they do (held-out error x {gain:.2f}). Check the motors' torque constants",
+        f"geometric mean one) they do (held-out error x {scores[1].size(voting) / scores[0].size(voting):.2f}). Check "
+        "the motors' torque constants",
     )
+
+
+def _energies(test: Moments, training: Moments, parameters: Array) -> tuple[Array, Array]:
+    """Squared errors on a test and mean squares on what was fitted, by joint."""
+    rows = np.maximum(training.count.sum(axis=0), 1.0)
+    return test.residual_energy(parameters).sum(axis=0), training.residual_energy(parameters).sum(axis=0) / rows
+
+
+def _held_out_score(
+    moments: Moments, folds: Sequence[Indices], energies: Sequence[tuple[Array, Array]]
+) -> HeldOutScore:
+    tests = moments.merged_blocks(folds)
+    energy, variance = (np.array(one) for one in zip(*energies, strict=True))
+    return HeldOutScore(energy, tests.target_energy(), tests.count, variance)
 
 
 def scaled(moments: Moments, gains: Array) -> Moments:
@@ -191,13 +221,13 @@ class _GainFit:
     def _cost(self, moments: Moments, g: Array, theta: Array) -> float:
         """Weighted residual energy, raised by what gains far from one have to pay."""
         energy = self.error(scaled(moments, g), theta) ** 2
-        return energy * (1.0 + TOLL * float(np.sum((np.log(g) / USUAL) ** 2)))
+        return energy * (1.0 + PRICE * float(np.sum((np.log(g) / USUAL) ** 2)))
 
     def _gauss_newton(self, moments: Moments, g: Array, theta: Array, cost: float) -> Array:
         """Change of ``log g`` from one convex problem in bodies and gains, clipped."""
         dofs, p = len(g), len(self.parameters)
         normal = _with_gain_columns(scaled(moments, g), theta).pooled(self.weights)
-        xx, xy, pull = normal.xx.copy(), normal.xy.copy(), TOLL * cost / USUAL**2
+        xx, xy, pull = normal.xx.copy(), normal.xy.copy(), PRICE * cost / USUAL**2
         xx[p:, p:] += pull * np.eye(dofs)
         xy[p:] -= pull * np.log(g)
         found = constrained_least_squares(
@@ -208,7 +238,7 @@ class _GainFit:
     @cached_property
     def _bodies(self) -> ProjectionProblem:
         return build_projection(
-            self.parameters, consistency=self.consistency, knowledge=self.knowledge, prior_budget=PRIOR_BUDGET
+            self.parameters, consistency=self.consistency, knowledge=self.knowledge
         )
 
     @cached_property
@@ -219,13 +249,15 @@ class _GainFit:
             (*self.parameters, *columns),
             consistency=self.consistency,
             knowledge=(*self.knowledge, one),
-            prior_budget=PRIOR_BUDGET,
         )
 
 
 def _weights(moments: Moments, parameters: Sequence[Parameter]) -> Array:
+    """``1/σ²`` by joint; zero for joints whose torque nothing explains."""
     prior = np.array([parameter.prior for parameter in parameters])
-    return np.asarray(Ridge(standard_errors=False).estimate(moments, prior).noise_std ** -2.0)
+    estimate = Ridge(standard_errors=False).estimate(moments, prior)
+    missed, felt = (one.sum(axis=0) for one in (moments.residual_energy(estimate.parameters), moments.target_energy()))
+    return np.where(missed < (1.0 - EXPLAINED) * felt, estimate.noise_std**-2.0, 0.0)
 
 
 def _with_gain_columns(moments: Moments, parameters: Array) -> Moments:

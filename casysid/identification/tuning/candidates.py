@@ -1,0 +1,169 @@
+"""One set of moments with every column that may be asked for, from which each smaller model is read off."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from casysid.dynamics import (
+    PHYSICAL_KINDS,
+    Armature,
+    Direction,
+    DriveState,
+    FrictionColumn,
+    FrictionKind,
+    MaxwellSlip,
+    Parameter,
+    Regressor,
+    build_regressor,
+    extend_regressor,
+    with_width,
+)
+from casysid.dynamics.friction import joint_directions
+from casysid.identification.friction_candidates import Proposal, joined, joint_uses, propose
+from casysid.identification.passes import Passes
+from casysid.identification.settings import Settings
+from casysid.moments import Indices, Moments
+
+DISPLACEMENTS = (0.01, 0.03, 0.1, 0.3)
+"""Of the elements of friction before sliding, in standard deviations of the position: half-decades below the travel,
+down to where an element is as sharp as Coulomb's smooth sign."""
+
+
+@dataclass(frozen=True)
+class FileGravity(FrictionColumn):
+    """What the model file's own bodies ask for at rest: no friction, but a column to test clocks by."""
+
+    kind: ClassVar[str] = "file_gravity"
+    is_friction: ClassVar[bool] = False
+
+    def unit(self, direction: Direction) -> str:
+        """None."""
+        return "1"
+
+    def torque(self, direction: Direction, state: DriveState) -> Any:
+        """Of the file's parameters."""
+        return state.static_torque(None)
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Moments of the usual model, of what may join it, and of the file's gravity.
+
+    Attributes:
+        base: The usual model.
+        regressor: Of all columns, those of ``base`` first.
+        moments: Of ``regressor``.
+        proposals: What may join, with the columns of each.
+        gravity: Columns of the file's gravity by degree of freedom; only of those that have one.
+    """
+
+    base: Regressor
+    regressor: Regressor
+    moments: Moments
+    proposals: tuple[tuple[Proposal, tuple[int, ...]], ...]
+    gravity: dict[int, int]
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Of all columns."""
+        return self.regressor.parameters
+
+    def model(self, taken: Sequence[tuple[int, ...]] = ()) -> Indices:
+        """Columns of the usual model with some proposals'."""
+        return np.array([*range(len(self.base.names)), *(column for columns in taken for column in columns)])
+
+
+def usual_friction(passes: Passes, settings: Settings) -> tuple[FrictionKind, ...]:
+    """The friction asked for, as sharp as the motions allow; with friction before sliding if the data may choose."""
+    width: Any = settings.coulomb_width or tuple(passes.width.tolist())
+    friction = with_width(settings.friction, width)
+    if passes.band.cutoff is None or not settings.choose_friction or MaxwellSlip.kind in [one.kind for one in friction]:
+        return friction
+    displacements = {
+        direction.name: tuple(share * passes.travel[dof] for share in DISPLACEMENTS)
+        for dof, direction in joint_directions(passes.robot).items()
+        if passes.travel[dof] > 0.0 and dof in _single(passes)
+    }
+    return (*friction, MaxwellSlip(displacements)) if displacements else friction
+
+
+def gather_candidates(passes: Passes, settings: Settings) -> Candidates:
+    """One pass over the recordings with all columns.
+
+    Args:
+        passes: Over what is fitted.
+        settings: Its friction and couplings are the usual model's.
+    """
+    robot, friction = passes.robot, usual_friction(passes, settings)
+    base = build_regressor(
+        robot,
+        friction=friction,
+        couplings=settings.couplings,
+        quasi_static=bool(settings.quasi_static),
+        torque_gains=settings.torque_gains,
+    )
+    asked = settings.choose_friction and passes.band.cutoff is not None
+    proposals = _proposals(passes, settings, friction) if asked else ()
+    directions = joint_directions(robot) if passes.band.cutoff is not None else {}
+    gravity = [(FileGravity(), directions[dof]) for dof in directions]
+    additions = [*gravity, *(column for proposal in proposals for column in proposal.columns)]
+    regressor = extend_regressor(base, additions) if additions else base
+    first = len(base.names) + len(gravity)
+    return Candidates(
+        base,
+        regressor,
+        passes.moments(regressor),
+        tuple(_with_columns(proposals, regressor, len(base.parts) + len(gravity), first)),
+        {dof: len(base.names) + k for k, dof in enumerate(directions)},
+    )
+
+
+def _with_columns(
+    proposals: Sequence[Proposal], regressor: Regressor, part: int, first: int
+) -> list[tuple[Proposal, tuple[int, ...]]]:
+    """Each proposal with its columns, which follow each other from ``first``, those of part number ``part``."""
+    found = []
+    for proposal in proposals:
+        count = sum(len(one.columns) for one in regressor.parts[part : part + len(proposal.columns)])
+        found.append((proposal, tuple(range(first, first + count))))
+        part, first = part + len(proposal.columns), first + count
+    return found
+
+
+def _proposals(passes: Passes, settings: Settings, friction: Sequence[FrictionKind]) -> tuple[Proposal, ...]:
+    uses = joint_uses(passes.robot, passes.speed, passes.width, passes.travel)
+    kinds = tuple(kind for kind in PHYSICAL_KINDS if kind is not MaxwellSlip)
+    proposals = propose(passes.robot, friction, settings.couplings, uses, kinds)
+    if not settings.quasi_static:
+        return proposals
+    return tuple(one for one in proposals if Armature.kind not in [kind.kind for kind, _ in one.columns])
+
+
+def _single(passes: Passes) -> set[int]:
+    """Degrees of freedom that are joints of their own."""
+    return {joint.v.start for joint in passes.robot.joints if joint.v.stop - joint.v.start == 1}
+
+
+def final_regressor(candidates: Candidates, settings: Settings, taken: Sequence[Proposal]) -> Regressor:
+    """The usual model with the proposals that were taken, each kind of friction once."""
+    model = joined(candidates.base.friction, settings.couplings, taken)
+    return build_regressor(
+        candidates.base.robot,
+        friction=model.columns,
+        couplings=model.couplings,
+        quasi_static=bool(settings.quasi_static),
+        torque_gains=settings.torque_gains,
+    )
+
+
+def moments_of(regressor: Regressor, candidates: Candidates, taken: Sequence[tuple[Proposal, tuple[int, ...]]]) -> Moments:
+    """The moments of a final regressor, read off those of all candidates."""
+    columns = candidates.model([places for _, places in taken])
+    by_name = {candidates.parameters[column].name.split(" #")[0]: int(column) for column in columns}
+    moments = candidates.moments.select_columns([by_name[name] for name in regressor.names])
+    return dataclasses.replace(moments, columns=regressor.names)
