@@ -13,13 +13,13 @@ from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
-from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from casysid.arrays import Array
 from casysid.dynamics.regressor import Regressor
 from casysid.errors import ParameterError
 from casysid.moments import Moments
 from casysid.signals.averaging import BandAverage, WindowSums
+from casysid.threads import single_threaded
 
 LARGEST_INVALID_SHARE = 0.01
 """An average counts for a joint if no more than this share of its weight lies on samples that do not."""
@@ -69,7 +69,7 @@ def accumulate_moments(
     groups = np.array_split(chosen, min(blocks, len(chosen)))
     widths = [len(columns) + 1 for columns in regressor.row_columns]
     sums, counts = np.zeros((len(groups), sum(width**2 for width in widths))), np.zeros((len(groups), len(widths)))
-    with threadpool_limits(1, user_api="blas"):  # threads of ours beside threads of BLAS would wait for each other
+    with single_threaded():
         if average is None:
 
             def square(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, tuple[Array, Array]]:

@@ -15,6 +15,7 @@ from casysid.excitation.problem import ExcitationProblem
 from casysid.moments import read_moments
 from casysid.recording import Recording
 from casysid.signals import motion_band, motion_from_recording
+from casysid.threads import single_threaded
 
 CUTOFF_OVER_BAND = 3.0
 """Low-pass cut-off over the frequency that holds nearly all of a recording's motion."""
@@ -22,6 +23,7 @@ HIGHEST_SHARE_OF_RATE = 0.35
 """Of the rate of samples; no cut-off is higher."""
 
 
+@single_threaded()
 def after_recordings(
     problem: ExcitationProblem, recordings: Sequence[Recording], *, cutoff: float | None = None
 ) -> ExcitationProblem:
@@ -40,6 +42,7 @@ def after_recordings(
     return problem.knowing_gram(sum((_gram(problem, one, cutoff) for one in recordings), 0.0))
 
 
+@single_threaded()
 def after_result(problem: ExcitationProblem, path: str | Path) -> ExcitationProblem:
     """The same problem, knowing what an identification's recordings tell under the problem's torque noise.
 

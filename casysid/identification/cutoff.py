@@ -21,6 +21,7 @@ from casysid.identification.settings import Settings
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.signals import motion_band
+from casysid.threads import single_threaded
 
 BAND_MARGIN = 3.0
 ENERGY_IN_BAND = 0.95
@@ -59,6 +60,7 @@ class CutoffChoice:
         return self.equations or self.cutoff
 
 
+@single_threaded()
 def choose_cutoff(
     robot: Robot,
     recordings: Sequence[Recording],

@@ -42,6 +42,7 @@ from casysid.projection import ProjectionResult, build_projection, project
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.signals import Motion, aligned
+from casysid.threads import single_threaded
 from casysid.uncertainty import ParameterUncertainty, propagate
 
 PRIOR_BUDGET = 0.03
@@ -85,6 +86,7 @@ class Preparation:
     seconds: dict[str, float]
 
 
+@single_threaded()
 def identify(
     robot: Robot,
     recordings: Recording | Sequence[Recording],
@@ -112,6 +114,7 @@ def identify(
     )
 
 
+@single_threaded()
 def prepare(
     robot: Robot,
     recordings: Recording | Sequence[Recording],
@@ -158,6 +161,7 @@ def prepare(
     )
 
 
+@single_threaded()
 def solve(preparation: Preparation, settings: Settings, *, progress: Progress = silent) -> IdentificationResult:
     """Estimate, make consistent, and check: everything after the data have been read."""
     problem, regressor = preparation.problem, preparation.problem.regressor

@@ -10,6 +10,7 @@ import numpy as np
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
 from casysid.signals import Motion, low_passed
+from casysid.threads import single_threaded
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,7 @@ class TorqueError:
     predictions: tuple[Array, ...]
 
 
+@single_threaded()
 def torque_error(
     regressor: Regressor, parameters: Array, motions: Sequence[Motion], cutoff: float | None
 ) -> TorqueError:

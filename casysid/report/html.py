@@ -19,6 +19,7 @@ from casysid.report.tables import (
     mistake_table,
     source_table,
 )
+from casysid.threads import single_threaded
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Section:
     lines: tuple[str, ...] = ()
 
 
+@single_threaded()
 def write_report(result: IdentificationResult, path: Path) -> None:
     """Write ``report.html``, whole or not at all."""
     temporary = path.with_name(path.name + ".part")
@@ -40,6 +42,7 @@ def write_report(result: IdentificationResult, path: Path) -> None:
     os.replace(temporary, path)
 
 
+@single_threaded()
 def render_report(result: IdentificationResult) -> str:
     """The report as HTML text."""
     from jinja2 import Environment

@@ -10,6 +10,7 @@ import numpy as np
 
 from casysid.report.pictures import MEASURED, MOST_POINTS, PREDICTED, RESIDUAL, figure
 from casysid.report.tables import torque_unit
+from casysid.threads import single_threaded
 from casysid.validation import Rehearsal
 from casysid.validation.tracking import position_error
 
@@ -19,6 +20,7 @@ MOST_COMBINATIONS = 30
 SHOWN_SECONDS = 12.0
 
 
+@single_threaded()
 def write_rehearsal_pictures(rehearsal: Rehearsal, directory: Path) -> tuple[Path, ...]:
     """Write ``torques.png``, ``tracking.png`` and ``parameters.png``, each whole or not at all; their paths."""
     pictures = {

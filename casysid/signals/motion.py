@@ -17,6 +17,7 @@ from casysid.robot.coordinates import configuration_from_channels, state_from_ch
 from casysid.signals.noise import position_noise
 from casysid.signals.smoothing import Smoother, build_smoother
 from casysid.signals.standstill import standing
+from casysid.threads import single_threaded
 
 MINIMUM_SAMPLES = 8
 LONGEST_RESPONSE = 4096
@@ -91,6 +92,7 @@ class Motion:
         )
 
 
+@single_threaded()
 def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | None) -> Motion:
     """The recording's positions smoothed at ``cutoff`` [Hz] and differentiated; each stretch between gaps by itself.
 
@@ -127,6 +129,7 @@ def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | No
     )
 
 
+@single_threaded()
 def low_passed(time: Array, values: Array, cutoff: float) -> Array:
     """Values, shape (N, n), behind the zero-phase low-pass, each stretch between gaps in time by itself."""
     smoothed = [

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.signal import periodogram
 
 from casysid.arrays import Array
+from casysid.threads import single_threaded
 
 MINIMUM_GAPS = 10
 MULTIPLES_THAT_TELL = 9.0
@@ -28,6 +29,7 @@ def _even_samples(time: Array, position: Array) -> tuple[Array, float]:
     return np.stack([np.interp(grid, time, column) for column in position.T], axis=1), 1.0 / step
 
 
+@single_threaded()
 def motion_band(time: Array, position: Array, share: float = 0.99) -> Array:
     """Frequency below which ``share`` of each channel's velocity energy lies [Hz], shape (n,), sensor noise left out.
 
@@ -45,6 +47,7 @@ def motion_band(time: Array, position: Array, share: float = 0.99) -> Array:
     return np.asarray(np.where(total[-1] > 0, frequency[reached], 0.0))
 
 
+@single_threaded()
 def position_noise(time: Array, position: Array) -> Array:
     """Standard deviation of position noise by channel, shape (n,), in the channel's unit.
 
@@ -58,6 +61,7 @@ def position_noise(time: Array, position: Array) -> Array:
     return np.asarray(np.maximum(np.sqrt(floor * rate / 2.0), position_resolution(position) / np.sqrt(12.0)))
 
 
+@single_threaded()
 def smoothing_cutoff(time: Array, position: Array, usual: float = np.inf) -> float:
     """Cut-off [Hz] of the smoothing spline: the usual one where noise is light, else what leaves accelerations best.
 

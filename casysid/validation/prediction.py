@@ -16,6 +16,7 @@ from casysid.identification.problem import USUAL_WIDTH, make_motion, with_widths
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.signals import aligned
+from casysid.threads import single_threaded
 from casysid.validation.earlier import Drives, EarlierResult
 
 
@@ -61,6 +62,7 @@ class Validation:
         }
 
 
+@single_threaded()
 def validate(
     robot: Robot,
     recordings: Sequence[Recording],
