@@ -35,8 +35,9 @@ class Section:
 
 
 @single_threaded()
-def write_report(result: IdentificationResult, path: Path) -> None:
+def write_report(result: IdentificationResult, path: str | Path) -> None:
     """Write ``report.html``, whole or not at all."""
+    path = Path(path)
     temporary = path.with_name(path.name + ".part")
     temporary.write_text(render_report(result), encoding="utf-8")
     os.replace(temporary, path)

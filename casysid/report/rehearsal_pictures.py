@@ -21,15 +21,16 @@ SHOWN_SECONDS = 12.0
 
 
 @single_threaded()
-def write_rehearsal_pictures(rehearsal: Rehearsal, directory: Path) -> tuple[Path, ...]:
+def write_rehearsal_pictures(rehearsal: Rehearsal, directory: str | Path) -> tuple[Path, ...]:
     """Write ``torques.png``, ``tracking.png`` and ``parameters.png``, each whole or not at all; their paths."""
     pictures = {
         "torques.png": rehearsed_torque_figure(rehearsal),
         "tracking.png": tracking_figure(rehearsal),
         "parameters.png": parameter_figure(rehearsal),
     }
-    directory.mkdir(parents=True, exist_ok=True)
-    return tuple(write_png(canvas, directory / name) for name, canvas in pictures.items())
+    folder = Path(directory)
+    folder.mkdir(parents=True, exist_ok=True)
+    return tuple(write_png(canvas, folder / name) for name, canvas in pictures.items())
 
 
 def write_png(canvas: Any, path: Path) -> Path:
