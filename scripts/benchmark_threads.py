@@ -53,10 +53,15 @@ def identify(robot: str, logs: Sequence[Path], threads: Mapping[str, str]) -> Sp
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "casysid", "identify", robot, *map(str, logs), "--split", "0.6"]
         used, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-        subprocess.run(
-            [*command, "--out", folder], check=True, capture_output=True, env={**environment, **threads}, text=True
+        done = subprocess.run(
+            [*command, "--out", folder],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            env={**environment, **threads},
         )
         wall, now = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+    if done.returncode:
+        sys.exit(f"{' '.join(command)} ended with {done.returncode}:\n{done.stderr.decode()}")
     return Spent(now.ru_utime + now.ru_stime - used.ru_utime - used.ru_stime, wall)
 
 
