@@ -13,13 +13,13 @@ from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
-from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from casysid.arrays import Array
 from casysid.dynamics.regressor import Regressor
 from casysid.errors import ParameterError
 from casysid.moments import NEAR_REST, Moments
 from casysid.signals.averaging import BandAverage, WindowSums
+from casysid.threads import single_threaded
 
 LARGEST_INVALID_SHARE = 0.01
 """An average counts for a joint if no more than this share of its weight lies on samples that do not."""
@@ -78,7 +78,7 @@ def accumulate_moments(
         joints, rows_of = (*joints, *(f"{joint}{NEAR_REST}" for joint in joints)), (*rows_of, *rows_of)
         widths = [*widths, *widths]
     sums, counts = [np.zeros((len(groups), width, width)) for width in widths], np.zeros((len(groups), len(widths)))
-    with threadpool_limits(1, user_api="blas"):  # threads of ours beside threads of BLAS would wait for each other
+    with single_threaded():
         if average is None:
 
             def square(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, tuple[Array, list[Array]]]:

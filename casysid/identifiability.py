@@ -22,6 +22,7 @@ from casysid.dynamics import Regressor
 from casysid.moments import Moments
 from casysid.robot import Robot
 from casysid.robot.coordinates import state_from_channels
+from casysid.threads import single_threaded
 
 RANK_TOLERANCE = 3e-5
 """Relative singular values below this are rounding of the model's angles (four digits give 1e-6), not rank."""
@@ -138,6 +139,7 @@ def _eliminate(S: Array, live: Array, smallest: float) -> tuple[npt.NDArray[np.i
     return np.array(independent, dtype=np.intp), R[: len(independent)]
 
 
+@single_threaded()
 def structural_base_parameters(regressor: Regressor, *, samples: int = 0, seed: int = 0) -> BaseParameters:
     """Base parameters of the mechanism itself, from random states within its limits (Gautier 1991)."""
     count = samples or FEWEST_STATES + STATES_PER_COLUMN * max(map(len, regressor.row_columns), default=0)
@@ -162,6 +164,7 @@ def _gram_of_states(regressor: Regressor, q: Array, v: Array, a: Array) -> Array
     return gram
 
 
+@single_threaded()
 def excited_base_parameters(regressor: Regressor, moments: Moments, noise_std: Array) -> BaseParameters:
     """Base parameters that a recording shows, joints weighted by ``1/σ²``; ``noise_std`` of shape (joints,), [N m]."""
     return base_parameters_of_gram(moments.pooled(noise_std**-2.0).xx, regressor.names)

@@ -366,14 +366,14 @@ def write_moments(moments: Moments, path: Path) -> None:
         partial.unlink(missing_ok=True)
 
 
-def read_moments(path: Path) -> Moments:
+def read_moments(path: str | Path) -> Moments:
     """What :func:`write_moments` wrote, as one block.
 
     Raises:
         ParameterError: The file is not there, or is something else.
     """
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
+        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as content:
             columns, joints = (tuple(str(name) for name in content[key]) for key in ("columns", "joints"))
             if "gram" in content:  # version 0.1.0 wrote all columns of every joint
                 return Moments.from_dense(content["gram"], content["count"], columns, joints)

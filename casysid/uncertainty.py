@@ -26,6 +26,7 @@ from casysid.estimation.covariance import covariance_from_blocks
 from casysid.inertia import is_consistent, mass_properties
 from casysid.moments import Moments
 from casysid.projection import ParameterLike, ProjectionProblem, ProjectionResult, project_samples
+from casysid.threads import single_threaded
 
 SAMPLES = 40
 """Projected samples: standard errors are known to some 10 % of themselves."""
@@ -80,6 +81,7 @@ class ParameterUncertainty:
         return _interval(self.links, self.quantile(level) * self.link_std, POSITIVE)
 
 
+@single_threaded()
 def propagate(
     estimate: Estimate,
     moments: Moments,
@@ -123,6 +125,7 @@ def propagate(
     return _uncertainty(answer, covariance, spread, known, inertial, non_negative)
 
 
+@single_threaded()
 def torque_std(regressor: Regressor, covariance: Array, q: Array, v: Array, a: Array) -> Array:
     """Standard error of the predicted torque that comes of the parameters', shape (N, nv), [N m].
 

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from casysid.arrays import Array
 from casysid.dynamics import compiled, replay
 from casysid.errors import ParameterError
+from casysid.threads import single_threaded
 
 FIND_FROM = 10_000  # samples: evaluating fewer takes no longer than looking for a compiled kernel
 COMPILE_FROM = 100_000  # samples: replaying more takes longer than compiling
@@ -111,6 +112,7 @@ class Bulk:
         pieces = _split(groups, self._engines.longest_piece)
         threads = max(min(threads, len(pieces)), 1)
 
+        @single_threaded()
         def work(piece: Indices) -> Result:
             with self._engines.lent(len(piece)) as engine:
                 return consume(_run(engine, inputs, piece), piece)

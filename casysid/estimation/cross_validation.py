@@ -12,6 +12,7 @@ from casysid.errors import ParameterError
 from casysid.estimation.base import Estimator
 from casysid.estimation.standardise import StandardisedProblem
 from casysid.moments import Moments, NormalEquations
+from casysid.threads import single_threaded
 
 MINIMUM_BLOCKS = 2
 
@@ -56,6 +57,7 @@ def _means(problem: StandardisedProblem, blocks: npt.NDArray[np.intp]) -> Normal
     return NormalEquations(part.xx * factor, part.xy * factor, part.yy * factor, part.count)
 
 
+@single_threaded()
 def cross_validated_energy(estimator: Estimator, moments: Moments, prior: Array | None, folds: int = 5) -> Array:
     """``Σ (y - xᵀθ)²`` by joint, shape (joints,), every block predicted by parameters fitted without its fold."""
     energy = np.zeros(len(moments.joints))

@@ -24,6 +24,7 @@ from casysid.estimation.denoising_fit import DenoisingFit, Scale
 from casysid.estimation.mixtures import find_parts
 from casysid.estimation.standardise import StandardisedProblem, check_prior, estimate_noise_std, standardise
 from casysid.moments import Moments
+from casysid.threads import single_threaded
 
 SETTLED = 0.01
 """Relative change of the joints' noise at which their weights have settled."""
@@ -70,6 +71,7 @@ class DenoisingEstimator(Estimator):
     def scale(self, problem: StandardisedProblem) -> Scale:
         """The units in which the model sees the problem."""
 
+    @single_threaded()
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """The chosen vector; columns without energy and directions that the data do not see stay at ``prior``."""
         theta0 = check_prior(moments, prior)

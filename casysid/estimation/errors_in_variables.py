@@ -31,6 +31,7 @@ from casysid.estimation.standardise import (
     solve_least_squares,
 )
 from casysid.moments import Moments
+from casysid.threads import single_threaded
 
 REWEIGHTINGS = 3
 """Of the joints, before the energy of their residuals is settled."""
@@ -53,6 +54,7 @@ class ErrorsInVariables(Estimator):
         if not 0.0 < self.margin < 1.0:
             raise ParameterError(f"errors in variables: margin must lie between 0 and 1; got {self.margin}")
 
+    @single_threaded()
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """Parameters without the attenuation by input noise; unseen directions stay at the prior."""
         if moments.noise is None:

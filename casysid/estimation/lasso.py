@@ -19,6 +19,7 @@ from casysid.estimation.cross_validation import cross_validate
 from casysid.estimation.selection import conditional_covariance
 from casysid.estimation.standardise import standardise
 from casysid.moments import Moments, NormalEquations
+from casysid.threads import single_threaded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +54,7 @@ class LassoRegression(Estimator):
                 f"got {self.smallest_strength}, {self.strengths} and {self.folds}"
             )
 
+    @single_threaded()
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """Shrunk coefficients; columns that do not survive stay at the prior.
 

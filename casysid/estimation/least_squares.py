@@ -12,6 +12,7 @@ from casysid.estimation.base import Estimate, Estimator, Status
 from casysid.estimation.covariance import covariance_from_blocks
 from casysid.estimation.standardise import check_prior, solve_least_squares, standardise
 from casysid.moments import Moments
+from casysid.threads import single_threaded
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class OrdinaryLeastSquares(Estimator):
 
     name: ClassVar[str] = "ols"
 
+    @single_threaded()
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """Parameters of least ``Σ (y - xᵀθ)²``, closest to the prior in columns scaled to unit energy."""
         theta0 = check_prior(moments, prior)
@@ -54,6 +56,7 @@ class WeightedLeastSquares(Estimator):
 
     name: ClassVar[str] = "wls"
 
+    @single_threaded()
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """Parameters of least ``Σ_j Σ (y - xᵀθ)² / σ_j²``, closest to the prior in columns scaled to unit energy."""
         problem = standardise(moments, prior)

@@ -19,6 +19,7 @@ from casysid.estimation.cross_validation import cross_validate
 from casysid.estimation.selection import mean_variance
 from casysid.estimation.standardise import SPECTRUM_TOLERANCE, standardise
 from casysid.moments import Moments, NormalEquations
+from casysid.threads import single_threaded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +45,7 @@ class PartialLeastSquares(Estimator):
                 f"got {self.components}, {self.max_components} and {self.folds}"
             )
 
+    @single_threaded()
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """Coefficients in the span of the components, with the covariance of least squares given the components.
 

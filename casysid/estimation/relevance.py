@@ -19,6 +19,7 @@ from casysid.estimation.base import Estimate, Estimator, Status
 from casysid.estimation.selection import conditional_covariance
 from casysid.estimation.standardise import standardise
 from casysid.moments import Moments, NormalEquations
+from casysid.threads import single_threaded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +45,7 @@ class RelevanceRegression(Estimator):
                 f"got {self.largest_precision}, {self.tolerance} and {self.max_iterations}"
             )
 
+    @single_threaded()
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """Posterior mean and covariance at the most likely precisions; irrelevant columns stay at the prior."""
         problem = standardise(moments, prior)

@@ -22,6 +22,7 @@ from casysid.estimation.cross_validation import cross_validate
 from casysid.estimation.prior_covariance import prior_covariance
 from casysid.estimation.standardise import StandardisedProblem, seen_directions, standardise
 from casysid.moments import Moments, NormalEquations
+from casysid.threads import single_threaded
 
 STRENGTHS: tuple[float, ...] = tuple(np.geomspace(1e-10, 1e1, 34).tolist())
 
@@ -47,6 +48,7 @@ class Ridge(Estimator):
         if self.folds < 2:
             raise ParameterError(f"ridge: cross-validation wants at least 2 folds; got {self.folds}")
 
+    @single_threaded()
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """Parameters between the prior and weighted least squares, as far as the data's own prediction error asks.
 

@@ -19,6 +19,7 @@ from casysid.estimation.base import Estimate, Estimator, Status
 from casysid.estimation.selection import conditional_covariance
 from casysid.estimation.standardise import solve_least_squares, standardise
 from casysid.moments import Moments, NormalEquations
+from casysid.threads import single_threaded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +51,7 @@ class StepwiseRegression(Estimator):
                 f"stepwise: wanted tolerance in (0, 1) and max_steps >= 1; got {self.tolerance} and {self.max_steps}"
             )
 
+    @single_threaded()
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """Least squares on the columns that pass; the others stay at the prior."""
         problem = standardise(moments, prior)

@@ -19,6 +19,7 @@ from casysid.estimation.base import Estimate, Estimator
 from casysid.estimation.selection import mean_variance
 from casysid.estimation.standardise import StandardisedProblem, seen_directions, standardise
 from casysid.moments import Moments, NormalEquations
+from casysid.threads import single_threaded
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -47,6 +48,7 @@ class TotalLeastSquares(Estimator):
             raise ParameterError("tls: noise_covariance must be positive semidefinite and not zero")
         object.__setattr__(self, "noise_covariance", frozen(noise))
 
+    @single_threaded()
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """The maximum likelihood fit in the directions that the data see, and Fuller's asymptotic covariance.
 
@@ -98,7 +100,7 @@ def _warn_if_useless(moments: Moments, problem: StandardisedProblem, fit: TotalF
             f"tls: residuals are {np.sqrt(energy / target.yy):.3g} times the target itself: noise of the same fraction "
             "in every column does not fit these data. Do not use these parameters; give noise_covariance",
             CasysidWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
 
 

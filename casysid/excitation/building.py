@@ -22,6 +22,7 @@ from casysid.excitation.problem import ExcitationProblem, random_states
 from casysid.excitation.series import FourierSeries, Motion, check_joints, state_of
 from casysid.identifiability import structural_base_parameters
 from casysid.robot import Robot
+from casysid.threads import single_threaded
 
 COULOMB_SHARE = 0.03
 """Width of the smooth sign of Coulomb friction, as a share of the velocity limit."""
@@ -35,6 +36,7 @@ STATES = 1000
 """Random states that scale the parameters and judge the pairs of links."""
 
 
+@single_threaded()
 def build_excitation(
     robot: Robot,
     *,

@@ -9,8 +9,10 @@ from casysid.excitation.problem import ExcitationProblem
 from casysid.excitation.program import default_settings
 from casysid.excitation.results import DesignStatus, ExcitationDesign, Progress
 from casysid.excitation.search import Search
+from casysid.threads import single_threaded
 
 
+@single_threaded()
 def design_excitation(
     problem: ExcitationProblem,
     *,
@@ -48,6 +50,7 @@ def design_excitation(
     return Search(problem, starts, seed, settings, progress).run()
 
 
+@single_threaded()
 def design_set(
     problem: ExcitationProblem, count: int, *, starts: int = 4, seed: int = 0, progress: Progress | None = None
 ) -> tuple[ExcitationDesign, ...]:

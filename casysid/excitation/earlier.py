@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
@@ -15,6 +16,7 @@ from casysid.excitation.problem import ExcitationProblem
 from casysid.moments import read_moments
 from casysid.recording import Recording
 from casysid.signals import motion_band, motion_from_recording
+from casysid.threads import single_threaded
 
 CUTOFF_OVER_BAND = 3.0
 """Low-pass cut-off over the frequency that holds nearly all of a recording's motion."""
@@ -22,6 +24,7 @@ HIGHEST_SHARE_OF_RATE = 0.35
 """Of the rate of samples; no cut-off is higher."""
 
 
+@single_threaded()
 def after_recordings(
     problem: ExcitationProblem, recordings: Sequence[Recording], *, cutoff: float | None = None
 ) -> ExcitationProblem:
@@ -40,31 +43,32 @@ def after_recordings(
     return problem.knowing_gram(sum((_gram(problem, one, cutoff) for one in recordings), 0.0))
 
 
+@single_threaded()
 def after_result(problem: ExcitationProblem, path: str | Path) -> ExcitationProblem:
     """The same problem, knowing what an identification's recordings tell under the problem's torque noise.
 
     Args:
-        problem: Whose noise is used; its columns have to be those of the identification.
+        problem: Whose noise is used; its columns have to be among those of the identification. Further ones, such as
+            friction that the data asked for, count as unknown.
         path: ``result.json`` as ``casysid identify`` writes it, with ``moments.npz`` beside it; or their folder.
 
     Raises:
-        ParameterError: A file is missing or is something else, or the columns are not the same.
+        ParameterError: A file is missing or is something else, or lacks columns of the design.
     """
     place = Path(path)
     place = place / "result.json" if place.is_dir() else place
     moments, regressor = read_moments(place.with_name("moments.npz")), problem.information.regressor
-    if set(moments.columns) != set(regressor.names) or moments.joints != regressor.robot.dofs:
-        differing = sorted(set(moments.columns) ^ set(regressor.names))
+    missing = sorted(set(regressor.names) - set(moments.columns))
+    if missing or moments.joints != regressor.robot.dofs:
         raise ParameterError(
-            f"excitation: {place.parent} is of other joints or columns than this design; wanted the same, got "
-            f"differences in {', '.join(differing[:6]) or 'joints'}. Take the robot and the friction columns that were "
-            "identified"
+            f"excitation: {place.parent} is of other joints or columns than this design; wanted the same, it lacks "
+            f"{', '.join(missing[:6]) or 'joints'}. Take the robot and the friction columns that were identified"
         )
     samples = _samples(place)
     averaged = samples / np.maximum(moments.count.sum(axis=0), 1.0)  # samples that went into a row
-    order = [moments.columns.index(name) for name in regressor.names]
+    wanted = np.array([moments.columns.index(name) for name in regressor.names])
     gram = moments.pooled(averaged * problem.information.noise_std**-2.0).xx
-    return problem.knowing_gram(gram[np.ix_(order, order)])
+    return problem.knowing_gram(_marginal(gram, wanted))
 
 
 def _samples(path: Path) -> float:
@@ -73,6 +77,17 @@ def _samples(path: Path) -> float:
         return float(json.loads(path.read_text(encoding="utf-8"))["samples"]["train"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ParameterError(f"{path}: this is no result.json as casysid identify writes it ({error})") from error
+
+
+def _marginal(gram: Array, wanted: npt.NDArray[np.intp]) -> Array:
+    """Information about some parameters while nothing is known of the others: the Schur complement."""
+    others = np.setdiff1d(np.arange(len(gram)), wanted)
+    size = np.sqrt(np.diag(gram)[others])
+    live = others[size > 0.0]
+    across = gram[np.ix_(live, wanted)] / size[size > 0.0, None]
+    among = gram[np.ix_(live, live)] / np.outer(size[size > 0.0], size[size > 0.0])
+    told = across.T @ np.linalg.lstsq(among, across, rcond=None)[0]
+    return np.asarray(gram[np.ix_(wanted, wanted)] - 0.5 * (told + told.T))
 
 
 def _gram(problem: ExcitationProblem, recording: Recording, cutoff: float | None) -> Array:

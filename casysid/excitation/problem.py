@@ -17,6 +17,7 @@ from casysid.excitation.information import Information
 from casysid.excitation.limits import JointLimits
 from casysid.excitation.series import ExcitationTrajectory, FourierSeries, Motion
 from casysid.robot import Robot
+from casysid.threads import single_threaded
 
 REFINEMENT = 10
 """The check looks at so many times as many instants as the design."""
@@ -118,6 +119,7 @@ class ExcitationProblem:
         return self.knowing(self.information.of_parameters(values))
 
 
+@single_threaded()
 def parameter_accuracy(problem: ExcitationProblem, names: Sequence[str]) -> AOptimal:
     """The criterion: mean variance of the base parameters that the named parameters are part of, in the scaled units.
 
@@ -138,6 +140,7 @@ def parameter_accuracy(problem: ExcitationProblem, names: Sequence[str]) -> AOpt
     return AOptimal(np.diag(chosen))
 
 
+@single_threaded()
 def torque_accuracy(problem: ExcitationProblem, *, samples: int = 500, seed: int = 0) -> AOptimal:
     """The criterion: mean variance of torques predicted at random states within the limits, relative to the noise."""
     states = random_states(problem.limits, problem.series, np.random.default_rng(seed), samples)

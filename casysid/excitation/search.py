@@ -6,7 +6,6 @@ import dataclasses
 from functools import cached_property
 
 import numpy as np
-from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from casysid.arrays import Array
 from casysid.excitation.blocks import Block
@@ -64,10 +63,6 @@ class Search:
 
     def run(self) -> ExcitationDesign:
         """Search, then make sure of the limits."""
-        with threadpool_limits(1, user_api="blas"):  # matrices are small: threads would wait for each other
-            return self._run()
-
-    def _run(self) -> ExcitationDesign:
         standing = find_standing(self.problem, self.seed)
         safe = small_start(self.problem, standing, self.seed)
         every = self.solver.count(Evaluation(self.problem))

@@ -13,6 +13,7 @@ from casysid.arrays import Array
 from casysid.excitation.blocks import Block, JointBlock, TorqueBlock
 from casysid.excitation.problem import REFINEMENT, ExcitationProblem
 from casysid.excitation.series import ExcitationTrajectory, Motion
+from casysid.threads import single_threaded
 
 CHUNK = 512
 """Instants looked at together, so that distances of many pairs stay in memory."""
@@ -85,6 +86,7 @@ class Verification:
         )
 
 
+@single_threaded()
 def verify(problem: ExcitationProblem, trajectory: ExcitationTrajectory, samples: int | None = None) -> Verification:
     """The least margin of every quantity over one period, from the constraints themselves, not their smooth versions.
 
@@ -99,6 +101,7 @@ def verify(problem: ExcitationProblem, trajectory: ExcitationTrajectory, samples
     return Verification(samples=count, margins=margins)
 
 
+@single_threaded()
 def verify_recorded(problem: ExcitationProblem, time: Array, motion: Motion, torque: Array) -> Verification:
     """The least margin of every quantity but jerk over a motion that took place, from the torque that acted.
 

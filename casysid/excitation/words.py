@@ -10,6 +10,7 @@ from casysid.arrays import Array
 from casysid.excitation.program import FLOOR
 from casysid.excitation.results import ExcitationDesign
 from casysid.identifiability import Identifiability
+from casysid.threads import single_threaded
 
 WEAK = 0.5
 """A base parameter whose expected standard deviation is more than this share of its value is known weakly."""
@@ -40,6 +41,7 @@ def expected_std(design: ExcitationDesign) -> Array:
     return np.asarray(_std(design.information, FLOOR * problem.measured) * problem.information.scale)
 
 
+@single_threaded()
 def information_groups(design: ExcitationDesign) -> tuple[Group, ...]:
     """Expected standard deviations by link and kind of parameter, before and after."""
     problem = design.problem
@@ -66,6 +68,7 @@ def information_groups(design: ExcitationDesign) -> tuple[Group, ...]:
     )
 
 
+@single_threaded()
 def describe(design: ExcitationDesign) -> tuple[str, ...]:
     """Sentences for a reader: the motion, the check, what remains unknown, what was assumed."""
     problem, checked = design.problem, design.check()

@@ -7,9 +7,11 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.identification.result import IdentificationResult
 from casysid.signals import Motion
+from casysid.threads import single_threaded
 from casysid.uncertainty import torque_std
 
 
+@single_threaded()
 def torque_band(result: IdentificationResult, motion: Motion, level: float = 0.95) -> Array:
     """Half the width of the band about the predicted torque that holds the measured one, shape (N, nv), [N m].
 

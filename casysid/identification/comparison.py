@@ -12,6 +12,7 @@ from casysid.estimation import Estimator
 from casysid.identification.pipeline import Preparation, Progress, silent, solve
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
+from casysid.threads import single_threaded
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +40,7 @@ class Comparison:
         return content
 
 
+@single_threaded()
 def compare(
     preparation: Preparation, methods: Sequence[Estimator], settings: Settings, *, progress: Progress = silent
 ) -> Comparison:

@@ -25,6 +25,7 @@ from casysid.recording import Recording
 from casysid.robot import JointKind, Robot
 from casysid.robot.coordinates import channels_from_configuration, configuration_from_channels
 from casysid.signals import low_passed, motion_band
+from casysid.threads import single_threaded
 
 SAMPLES, BLOCKS = 800, 12
 BAND_MARGIN, HIGHEST_SHARE_OF_RATE = 3.0, 0.2
@@ -153,6 +154,7 @@ class _Explanation:
         return np.asarray(self.residue.sum(axis=0))
 
 
+@single_threaded()
 def find_mistakes(robot: Robot, recordings: Sequence[Recording]) -> tuple[Mistake, ...]:
     """Mistakes that the model file's own prediction shows in recordings; none when nothing is clear.
 

@@ -14,6 +14,7 @@ import numpy as np
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
 from casysid.signals import BandAverage, Motion
+from casysid.threads import single_threaded
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +42,7 @@ class TorqueError:
     predictions: tuple[Array, ...]
 
 
+@single_threaded()
 def torque_error(
     regressor: Regressor, parameters: Array, motions: Sequence[Motion], cutoff: float | None
 ) -> TorqueError:

@@ -16,6 +16,7 @@ from casysid.arrays import Array
 from casysid.errors import ParameterError, SolverError
 from casysid.nlp.results import NlpSettings, NlpSolution, NlpStatus
 from casysid.nlp.watch import Progress, Watch, interruptible, largest_violation
+from casysid.threads import look_again, single_threaded
 
 _STATUS = {
     "Solve_Succeeded": NlpStatus.CONVERGED,
@@ -56,9 +57,11 @@ class NonlinearProgram:
     def _solver(self, more: dict[str, Any]) -> Any:
         options = {**self.settings.options(), **self._derivatives, **more, "iteration_callback": self._watch}
         try:
-            return ca.nlpsol("program", "ipopt", self._functions, options)
+            solver = ca.nlpsol("program", "ipopt", self._functions, options)
         except RuntimeError as error:
             raise SolverError(f"IPOPT did not take the program: {error}") from error
+        look_again()  # IPOPT brings its own BLAS
+        return solver
 
     def run(
         self, arguments: dict[str, Array], warm: bool, progress: Progress | None
@@ -67,7 +70,7 @@ class NonlinearProgram:
         with self._lock:
             solver = self._warm if warm else self._cold
             self._watch.begin(arguments, progress)
-            with interruptible(self._watch):
+            with single_threaded(), interruptible(self._watch):
                 answer = solver(**arguments)
             if self._watch.error is not None:
                 raise self._watch.error

@@ -18,8 +18,10 @@ from casysid.projection.problem import ProjectionProblem
 from casysid.projection.results import ProjectionResult
 from casysid.projection.solving import solve_task
 from casysid.projection.task import task_of
+from casysid.threads import single_threaded
 
 
+@single_threaded()
 def project(
     problem: ProjectionProblem,
     estimate: npt.ArrayLike,
@@ -56,6 +58,7 @@ def project(
     return solve_task(task_of(problem, misfit, prior), progress)
 
 
+@single_threaded()
 def constrained_least_squares(
     problem: ProjectionProblem,
     equations: NormalEquations,

@@ -115,7 +115,7 @@ def _nearest_consistent(layout: Layout, constraints: Constraints, prior: Array, 
             f"projection: the prior is not physically consistent at {', '.join(names)}; the nearest consistent values "
             f"take its place{', but links to be kept stay as they are' if kept.any() else ''}",
             CasysidWarning,
-            stacklevel=5,
+            stacklevel=6,
         )
     return nearest_consistent(bodies, consistency)
 

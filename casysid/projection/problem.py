@@ -10,6 +10,7 @@ from casysid.inertia import Consistency
 from casysid.projection.knowledge import Constraints, Knowledge, constraints_of
 from casysid.projection.layout import Layout, ParameterLike, layout_of
 from casysid.projection.program import ProjectionProgram, build_program
+from casysid.threads import single_threaded
 
 FLOOR = 1e-3
 """Default floor: no link keeps less than this fraction of its reference pseudo-inertia in any direction."""
@@ -38,6 +39,7 @@ class ProjectionProblem:
     program: ProjectionProgram
 
 
+@single_threaded()
 def build_projection(
     parameters: Sequence[ParameterLike],
     *,

@@ -28,6 +28,7 @@ from casysid.projection.objective import objective_of
 from casysid.projection.problem import ProjectionProblem
 from casysid.projection.results import ProjectionResult
 from casysid.projection.task import Task, task_of
+from casysid.threads import single_threaded
 
 ROUNDS = 10
 """Cuts of a sample are renewed so many times before the convex solver takes over."""
@@ -39,6 +40,7 @@ NEAR = 0.3
 """Eigenvalues at the answer below this are cut from the start."""
 
 
+@single_threaded()
 def project_samples(
     problem: ProjectionProblem,
     estimates: npt.ArrayLike,
@@ -82,7 +84,7 @@ def project_samples(
     missing = int(np.isnan(result[:, 0]).sum())
     if missing:
         message = f"projection: {missing} of {len(points)} samples have no answer and are nan"
-        warnings.warn(message, CasysidWarning, stacklevel=2)
+        warnings.warn(message, CasysidWarning, stacklevel=3)
     return result
 
 

@@ -42,7 +42,7 @@ def solve_task(task: Task, progress: Progress | None) -> ProjectionResult:
     local, iterations = _solve_locally(task, certificate, progress)
     scaled, status, solver = _choose(local, certificate)
     if status is not ProjectionStatus.CERTIFIED:
-        warnings.warn(f"projection: {status.value}", CasysidWarning, stacklevel=3)
+        warnings.warn(f"projection: {status.value}", CasysidWarning, stacklevel=4)
     gap = math.nan if local is None or certificate is None else task.data_misfit(local) - certificate.misfit
     return _result(task, scaled, status, solver, certificate, gap, iterations, began)
 

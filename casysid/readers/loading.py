@@ -19,8 +19,10 @@ from casysid.readers.units import check_units
 from casysid.readers.weaknesses import find_weaknesses
 from casysid.recording import BATCH, Recording, RecordingFile
 from casysid.robot import Robot
+from casysid.threads import single_threaded
 
 
+@single_threaded()
 def load_recording(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]]:
     """The recording in a file, and sentences about what is weak in it.
 

@@ -12,10 +12,12 @@ from casysid.arrays import Array
 from casysid.excitation import ExcitationDesign, information_groups
 from casysid.excitation.output import expected_torque
 from casysid.report.pictures import MEASURED, PREDICTED, RESIDUAL, figure
+from casysid.threads import single_threaded
 
 _POINTS = 1200
 
 
+@single_threaded()
 def write_excitation_pictures(design: ExcitationDesign, directory: str | Path) -> tuple[Path, ...]:
     """Write pictures of joints, torque, distances (if any are kept), spectrum and information as PNG files."""
     folder = Path(directory)

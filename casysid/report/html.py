@@ -19,6 +19,7 @@ from casysid.report.tables import (
     mistake_table,
     source_table,
 )
+from casysid.threads import single_threaded
 
 
 @dataclass(frozen=True)
@@ -33,13 +34,16 @@ class Section:
     lines: tuple[str, ...] = ()
 
 
-def write_report(result: IdentificationResult, path: Path) -> None:
+@single_threaded()
+def write_report(result: IdentificationResult, path: str | Path) -> None:
     """Write ``report.html``, whole or not at all."""
+    path = Path(path)
     temporary = path.with_name(path.name + ".part")
     temporary.write_text(render_report(result), encoding="utf-8")
     os.replace(temporary, path)
 
 
+@single_threaded()
 def render_report(result: IdentificationResult) -> str:
     """The report as HTML text."""
     from jinja2 import Environment

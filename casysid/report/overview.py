@@ -10,13 +10,16 @@ from casysid.recording import Source
 from casysid.report.tables import Table, mistake_table, number
 from casysid.robot import Robot
 from casysid.signals import band_of, noise_of
+from casysid.threads import single_threaded
 
 
+@single_threaded()
 def robot_tables(robot: Robot) -> list[tuple[str, Table]]:
     """Joints with their limits, links with their masses, and the base parameters."""
     return [("Joints", _joints(robot)), ("Links", _links(robot)), ("Identifiable combinations", _combinations(robot))]
 
 
+@single_threaded()
 def recording_tables(robot: Robot, recording: Source) -> list[tuple[str, Table]]:
     """What is in a recording, and how each channel moves."""
     summary = recording.summary()

@@ -10,6 +10,7 @@ import numpy as np
 
 from casysid.report.pictures import MEASURED, MOST_POINTS, PREDICTED, RESIDUAL, figure
 from casysid.report.tables import torque_unit
+from casysid.threads import single_threaded
 from casysid.validation import Rehearsal
 from casysid.validation.tracking import position_error
 
@@ -19,15 +20,17 @@ MOST_COMBINATIONS = 30
 SHOWN_SECONDS = 12.0
 
 
-def write_rehearsal_pictures(rehearsal: Rehearsal, directory: Path) -> tuple[Path, ...]:
+@single_threaded()
+def write_rehearsal_pictures(rehearsal: Rehearsal, directory: str | Path) -> tuple[Path, ...]:
     """Write ``torques.png``, ``tracking.png`` and ``parameters.png``, each whole or not at all; their paths."""
     pictures = {
         "torques.png": rehearsed_torque_figure(rehearsal),
         "tracking.png": tracking_figure(rehearsal),
         "parameters.png": parameter_figure(rehearsal),
     }
-    directory.mkdir(parents=True, exist_ok=True)
-    return tuple(write_png(canvas, directory / name) for name, canvas in pictures.items())
+    folder = Path(directory)
+    folder.mkdir(parents=True, exist_ok=True)
+    return tuple(write_png(canvas, folder / name) for name, canvas in pictures.items())
 
 
 def write_png(canvas: Any, path: Path) -> Path:

@@ -12,6 +12,7 @@ from casysid.errors import ParameterError
 from casysid.recording import Recording
 from casysid.recording.resolution import position_resolution
 from casysid.signals.noise import noise_level_error, position_noise
+from casysid.threads import single_threaded
 
 GIVEN, SPECTRUM = "given", "spectrum of the positions"
 
@@ -72,6 +73,7 @@ class InputNoise:
         return dataclasses.replace(recording, **changed)
 
 
+@single_threaded()
 def find_input_noise(recording: Recording, levels: NoiseLevels, *, as_logged: bool) -> InputNoise | None:
     """The noise of a recording's motion as far as given, else as found in its positions; None if neither is possible.
 

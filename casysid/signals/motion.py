@@ -20,6 +20,7 @@ from casysid.signals.alignment import moved_torque
 from casysid.signals.noise import noise_of, smoothed_noise, speed_of
 from casysid.signals.smoothing import Grid, build_smoother, memory
 from casysid.signals.standstill import standing
+from casysid.threads import single_threaded
 
 MINIMUM_SAMPLES = 8
 LONGEST_BRIDGE = 0.5
@@ -172,6 +173,7 @@ def motion_pieces(
                 yield made
 
 
+@single_threaded()
 def motion_from_recording(robot: Robot, recording: Source, cutoff: float | None, gap: float | None = None) -> Motion:
     """The recording's positions smoothed at ``cutoff`` [Hz] and differentiated; each stretch between gaps by itself.
 
@@ -201,6 +203,7 @@ def joined_motions(parts: list[Motion]) -> Motion:
     return dataclasses.replace(parts[0], **together)
 
 
+@single_threaded()
 def low_passed(time: Array, values: Array, cutoff: float) -> Array:
     """Values, shape (N, n), behind the zero-phase low-pass, each stretch between gaps in time by itself."""
     smoothed = [

@@ -11,6 +11,7 @@ from casysid.errors import RecordingError
 from casysid.recording import BATCH, PositionSpectrum
 from casysid.recording.resolution import ResolutionScan
 from casysid.recording.spectrum import SpectrumScan
+from casysid.threads import single_threaded
 
 SPLINE_ORDER = 3
 SAMPLES_PER_PARAMETER = 1e4
@@ -38,6 +39,7 @@ def spectrum_of(time: Array, position: Array) -> PositionSpectrum:
     return spectrum
 
 
+@single_threaded()
 def motion_band(time: Array, position: Array, share: float = 0.99) -> Array:
     """:func:`band_of` positions, shape (N, n), at increasing times [s]."""
     return band_of(spectrum_of(time, position), share)

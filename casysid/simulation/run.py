@@ -19,12 +19,14 @@ from casysid.simulation.reference import Reference, Trajectory
 from casysid.simulation.result import RunStatus, SimulatedRun
 from casysid.simulation.sensors import History, StateSensors, read_torques
 from casysid.simulation.watchdog import Watchdog
+from casysid.threads import single_threaded
 
 _TELL_EVERY = 1000  # ticks
 _STABLE = 1.5  # steps times decay rate that the integrator bears with room to spare
 _OFTEN = 0.01  # share of saturated samples that is worth a warning
 
 
+@single_threaded()
 def simulate(
     plant: Plant,
     controller: Controller,
@@ -202,7 +204,7 @@ class _Loop:
                 "or switch saturation off"
             )
         if complaint:
-            warnings.warn(f"simulate: robot '{robot.name}' {complaint}", CasysidWarning, stacklevel=4)
+            warnings.warn(f"simulate: robot '{robot.name}' {complaint}", CasysidWarning, stacklevel=5)
 
     def _record(self, channels: Array, tau: Array, rows: slice) -> Recording:
         plant, sensing = self.plant, self.plant.settings.sensing

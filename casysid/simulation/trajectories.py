@@ -14,6 +14,7 @@ from casysid.errors import CasysidWarning, ParameterError
 from casysid.robot import Joint, JointKind, Robot
 from casysid.simulation.reference import Reference
 from casysid.simulation.truth import finite_limit
+from casysid.threads import single_threaded
 
 _FREE_RANGE = {True: 0.2, False: 1.0}  # half the range of a coordinate without limits: [m] linear, [rad] angular
 _FREE_SPEED = {True: 0.5, False: 3.0}  # [m/s], [rad/s]
@@ -99,6 +100,7 @@ class Sinusoids:
         return position, first, second
 
 
+@single_threaded()
 def design_sinusoids(
     robot: Robot,
     *,
@@ -180,7 +182,7 @@ def _within_torque(motion: Sinusoids, share: float) -> Sinusoids:
         f"sinusoids: weight alone takes '{robot.dofs[worst]}' of robot '{robot.name}' beyond {share:.0%} of its effort "
         f"limit of {robot.effort_limit[worst]:.6g}; check the limits in {robot.source.name}",
         CasysidWarning,
-        stacklevel=3,
+        stacklevel=4,
     )
     return motion
 

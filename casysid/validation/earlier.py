@@ -41,14 +41,14 @@ class EarlierResult:
     torque_gains: Mapping[str, float] = field(default_factory=dict)
 
 
-def read_earlier_result(path: Path) -> EarlierResult:
+def read_earlier_result(path: str | Path) -> EarlierResult:
     """The part of a ``result.json`` that :class:`EarlierResult` holds.
 
     Raises:
         ParameterError: The file is not such a result, or its columns of friction are not casysid's own.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
         clock = content.get("time_base", {})
         return EarlierResult(
             drives=content["friction"],

@@ -8,12 +8,13 @@ from casysid.identification.output import write_json, write_result
 from casysid.validation.rehearsal import Rehearsal
 
 
-def write_rehearsal(rehearsal: Rehearsal, directory: Path) -> tuple[str, ...]:
+def write_rehearsal(rehearsal: Rehearsal, directory: str | Path) -> tuple[str, ...]:
     """Write ``rehearsal.json`` and all that an ordinary identification writes.
 
     Returns:
         What a person should know about the identified model, one sentence each.
     """
-    notes = write_result(rehearsal.result, directory)
-    write_json(rehearsal.to_json(), directory / "rehearsal.json")
+    folder = Path(directory)
+    notes = write_result(rehearsal.result, folder)
+    write_json(rehearsal.to_json(), folder / "rehearsal.json")
     return notes

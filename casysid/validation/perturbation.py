@@ -20,11 +20,13 @@ from casysid.inertia import (
 from casysid.robot import Robot
 from casysid.simulation import Mechanics
 from casysid.simulation.truth import true_parameters
+from casysid.threads import single_threaded
 
 FLATTEST = 1e-3
 """Share of its mean square radius that a link has at least in every direction: a flat or point-like link is no body."""
 
 
+@single_threaded()
 def hidden_truth(
     robot: Robot, mechanics: Mechanics, seed: int, *, inertia_spread: float = 0.1, friction_spread: float = 0.3
 ) -> Array:

@@ -13,6 +13,7 @@ from casysid.errors import ParameterError
 from casysid.excitation import ExcitationDesign, ExcitationProblem, ExcitationTrajectory, Verification, verify_recorded
 from casysid.excitation.series import Motion
 from casysid.simulation import IDEAL, PD, ControlModel, Plant, Reference, SimulatedRun
+from casysid.threads import single_threaded
 from casysid.validation.tracking import track
 
 BANDWIDTH = 6.0
@@ -80,6 +81,7 @@ class Playback:
     verification: Verification
 
 
+@single_threaded()
 def play(
     design: ExcitationDesign,
     plant: Plant | None = None,

@@ -15,6 +15,7 @@ from casysid.identification.problem import USUAL_WIDTH, make_motion, with_widths
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.signals import aligned
+from casysid.threads import single_threaded
 from casysid.validation.earlier import Drives, EarlierResult
 
 
@@ -60,6 +61,7 @@ class Validation:
         }
 
 
+@single_threaded()
 def validate(
     robot: Robot,
     recordings: Sequence[Recording],

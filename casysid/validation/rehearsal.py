@@ -22,6 +22,7 @@ from casysid.simulation import (
     PlantSettings,
     SimulatedRun,
 )
+from casysid.threads import single_threaded
 from casysid.validation.exciting import Excitation, excite
 from casysid.validation.perturbation import hidden_truth
 from casysid.validation.tracking import Tracking, measure_tracking, track
@@ -126,6 +127,7 @@ class Rehearsal:
         }
 
 
+@single_threaded()
 def rehearse(robot: Robot, settings: RehearsalSettings | None = None, progress: Progress = _silent) -> Rehearsal:
     """Rehearse the identification of a robot on a machine that differs from its file.
 

@@ -12,6 +12,7 @@ from casysid.simulation.controllers import PD, ComputedTorque
 from casysid.simulation.plant import Plant
 from casysid.simulation.reference import Trajectory
 from casysid.simulation.run import simulate
+from casysid.threads import single_threaded
 
 MEASURES = ("position", "velocity", "feedback")
 
@@ -46,6 +47,7 @@ class Tracking:
         return content | {name: dict(zip(dofs, getattr(self, name).tolist(), strict=True)) for name in MEASURES}
 
 
+@single_threaded()
 def track(
     plant: Plant, model: ControlModel, gains: PD, trajectory: Trajectory, *, rate: float, duration: float, seed: int = 0
 ) -> SimulatedRun:
@@ -53,6 +55,7 @@ def track(
     return simulate(plant, ComputedTorque(model, gains), trajectory, rate=rate, duration=duration, seed=seed)
 
 
+@single_threaded()
 def measure_tracking(plant: Plant, run: SimulatedRun) -> Tracking:
     """Tracking errors of a plant's run, against the truth."""
     return Tracking(

@@ -13,6 +13,7 @@ from casysid.estimation.covariance import block_covariance
 from casysid.identification import IdentificationResult
 from casysid.identification.problem import sum_moments
 from casysid.simulation import Plant, SimulatedRun
+from casysid.threads import single_threaded
 
 TWO_SIDED_95 = 1.96
 
@@ -63,12 +64,14 @@ class BaseComparison:
         }
 
 
+@single_threaded()
 def true_coefficients(plant: Plant, regressor: Regressor) -> Array:
     """The plant's parameters in the order of any regressor of its robot, shape (p,); zero for what it does not have."""
     known = dict(zip(build_regressor(plant.robot).names, plant.parameters, strict=True))
     return np.array([known.get(name, 0.0) for name in regressor.names])
 
 
+@single_threaded()
 def compare_base_parameters(result: IdentificationResult, plant: Plant) -> BaseComparison:
     """An identification's base parameters beside those of the plant it was made on."""
     base, regressor = result.structural, result.regressor
@@ -87,6 +90,7 @@ def compare_base_parameters(result: IdentificationResult, plant: Plant) -> BaseC
     )
 
 
+@single_threaded()
 def true_torque_error(regressor: Regressor, parameters: Mapping[str, Array], run: SimulatedRun) -> dict[str, Array]:
     """Error of predicted torque against the true one along the true motion, relative by joint, shape (nv,) by name.
 

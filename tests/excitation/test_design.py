@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from casysid.accumulation import accumulate_moments
 from casysid.bundled import find_model
+from casysid.dynamics import Coupling, build_regressor
 from casysid.errors import ParameterError, SolverError
 from casysid.excitation import (
     ConditionNumber,
@@ -146,6 +147,22 @@ def test_an_identification_counts_as_what_its_recordings_tell(problem, design, t
     wanted = after_recordings(problem, [recording], cutoff=20.0).known
     for path in (tmp_path, tmp_path / "result.json"):
         np.testing.assert_allclose(after_result(problem, path).known, wanted, rtol=1e-9, atol=1e-9 * wanted.max())
+
+
+def test_friction_that_only_the_identification_has_counts_as_unknown(problem, design, tmp_path):
+    recording, regressor = sample_recording(design, problem.rate), problem.information.regressor
+    motion, coupling = motion_from_recording(problem.robot, recording, 20.0), Coupling(problem.robot.dofs, (1.0, 1.0))
+    richer = build_regressor(problem.robot, regressor.friction, [coupling])
+    moments = accumulate_moments(richer, motion.q, motion.v, motion.a, motion.tau, blocks=1)
+    write_moments(moments, tmp_path / "moments.npz")
+    (tmp_path / "result.json").write_text(json.dumps({"samples": {"train": len(recording)}}))
+    rows = richer.evaluate(motion.q, motion.v, motion.a) / problem.information.noise_std[:, None]
+    own = np.isin(richer.names, regressor.names)
+    wanted, others = (rows.reshape(-1, len(own))[:, chosen] for chosen in (own, ~own))
+    assert others.shape[1] > 0
+    left = wanted - others @ np.linalg.lstsq(others, wanted)[0]
+    known = problem.knowing_gram(left.T @ left).known
+    np.testing.assert_allclose(after_result(problem, tmp_path).known, known, rtol=1e-9, atol=1e-9 * known.max())
 
 
 def test_another_robots_identification_is_refused(problem, tmp_path):

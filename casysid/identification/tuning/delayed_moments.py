@@ -14,12 +14,12 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
 from casysid.moments import Moments
 from casysid.signals import BandAverage, Motion
+from casysid.threads import single_threaded
 
 NODES = 13
 NODE_SPACING = 0.1
@@ -150,7 +150,7 @@ def _sum_one(
         ]
         return len(x), [r.T @ r for r in rows]
 
-    with threadpool_limits(1, user_api="blas"):
+    with single_threaded():
         for block, (equations, squares) in regressor.equations.map(
             square, inputs, np.array_split(inside, blocks), threads
         ):
