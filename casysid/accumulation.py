@@ -113,7 +113,7 @@ def accumulate_moments(
 def _sorted_rows(
     rows: Array, widths: Sequence[int], some_invalid: bool, apart: bool
 ) -> tuple[Array, Sequence[int], Mask | None]:
-    """Averaged rows and masks as :func:`_squares` wants them: each joint's rows twice where those near rest are apart."""
+    """Averaged rows and masks for :func:`_squares`; each joint's rows twice where those near rest are apart."""
     joints = len(widths) // 2 if apart else len(widths)
     values = rows[: sum(widths[:joints])]
     shares = rows[len(values) :]

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import solve_triangular
-from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
@@ -143,14 +142,17 @@ def _eliminate(S: Array, live: Array, smallest: float) -> tuple[npt.NDArray[np.i
 def structural_base_parameters(regressor: Regressor, *, samples: int = 0, seed: int = 0) -> BaseParameters:
     """Base parameters of the mechanism itself, from random states within its limits (Gautier 1991)."""
     count = samples or FEWEST_STATES + STATES_PER_COLUMN * max(map(len, regressor.row_columns), default=0)
-    q, v, a = random_states(regressor.robot, count, np.random.default_rng(seed))
-    return base_parameters_of_gram(_gram_of_states(regressor, q, v, a), regressor.names, quietest=RANK_TOLERANCE)
+    rng = np.random.default_rng(seed)
+    q, v, a = random_states(regressor.robot, count, rng)
+    remembered = (rng.uniform(-1.0, 1.0, (count, regressor.history_count)),) if regressor.history_count else ()
+    gram = _gram_of_states(regressor, q, v, a, remembered)
+    return base_parameters_of_gram(gram, regressor.names, quietest=RANK_TOLERANCE)
 
 
-def _gram_of_states(regressor: Regressor, q: Array, v: Array, a: Array) -> Array:
-    """``Σ x xᵀ`` over states and joints, shape (p, p), in memory of that size."""
+def _gram_of_states(regressor: Regressor, q: Array, v: Array, a: Array, remembered: tuple[Array, ...]) -> Array:
+    """``Σ x xᵀ`` over states and joints, shape (p, p), in memory of that size; ``remembered`` is what friction does."""
     rows, p = regressor.equations, len(regressor.names)
-    inputs, samples = rows.check((q, v, a, np.zeros(regressor.robot.nv)))
+    inputs, samples = rows.check((q, v, a, np.zeros(regressor.robot.nv), *remembered))
     gram = np.zeros((p, p))
     ends = np.cumsum([len(columns) + 1 for columns in regressor.row_columns])
 
@@ -159,7 +161,7 @@ def _gram_of_states(regressor: Regressor, q: Array, v: Array, a: Array) -> Array
             x = values[end - 1 - len(columns) : end - 1]
             gram[columns[:, None], columns] += x @ x.T
 
-    with threadpool_limits(1, user_api="blas"):
+    with single_threaded():
         deque(rows.map(add, inputs, [np.arange(samples)], threads=1), maxlen=0)
     return gram
 

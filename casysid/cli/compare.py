@@ -67,16 +67,17 @@ def compare(
         names = [kind.name for kind in ESTIMATORS] if methods == "all" else methods.split(",")
         estimators = [estimator_by_name(name) for name in names]
         settings = make_settings(
-            "ridge", consistency, cutoff, coupling, time_scale, delay, friction=friction, flip=flip
+            "empirical-bayes", consistency, cutoff, coupling, time_scale, delay, friction=friction, flip=flip
         )
         model = load_robot(robot, gravity, lock, floating_base)
         fitted, unseen = load_recordings(model, logs, held_out, split)
         with progress_bar(console) as progress:
-            preparation = prepare(model, fitted, settings, held_out=unseen, progress=progress)
+            noise_too = any(one.needs_input_noise for one in estimators)
+            preparation = prepare(model, fitted, settings, held_out=unseen, noise_too=noise_too, progress=progress)
             comparison = run(preparation, estimators, settings, progress=progress)
         table = comparison_table(comparison)
         Console().print(rich_table("Torque error, best first", table.header, table.rows))
-        console.print(f"torque delay: {preparation.delay.reason}", markup=False, soft_wrap=True)
+        console.print(f"torque delay: {preparation.choices.delay.reason}", markup=False, soft_wrap=True)
         for name, reason in comparison.failures.items():
             console.print(f"{name} failed: {reason}", markup=False, soft_wrap=True)
         if out is not None:

@@ -45,7 +45,7 @@ def identify(
     logs: LogsArgument,
     held_out: HeldOutOption = None,
     split: SplitOption = None,
-    method: Annotated[str, typer.Option(help="Estimator; 'casysid compare' lists them.")] = "ridge",
+    method: Annotated[str, typer.Option(help="Estimator; 'casysid compare' lists them.")] = "empirical-bayes",
     consistency: ConsistencyOption = ConsistencyChoice.FULL,
     flip: FlipOption = None,
     cutoff: CutoffOption = None,

@@ -135,7 +135,7 @@ class Estimate:
 
 
 Feasible = Callable[[Array, Array, float], Array]
-"""The possible parameters nearest to some, (p,), in a metric (p, p), given the residual energy in the metric's units."""
+"""The possible parameters nearest to some, (p,), in a metric (p, p), with the residual energy in its units."""
 
 
 class Estimator(ABC):

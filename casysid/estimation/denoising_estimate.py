@@ -7,7 +7,7 @@ relative to the prior, columns standardised, exact mixtures of others left out, 
 from __future__ import annotations
 
 import dataclasses
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal

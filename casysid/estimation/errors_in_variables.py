@@ -14,15 +14,17 @@ Source: Fuller 1987, *Measurement Error Models*, §2.5 (the modification) and §
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import ParameterError
-from casysid.estimation.base import Estimate, Estimator
-from casysid.estimation.ridge import Ridge
+from casysid.estimation.base import Estimate, Estimator, Feasible
+from casysid.estimation.empirical_bayes import EmpiricalBayes
 from casysid.estimation.standardise import (
     NOISE_FLOOR,
     check_prior,
@@ -31,7 +33,6 @@ from casysid.estimation.standardise import (
     solve_least_squares,
 )
 from casysid.moments import Moments
-from casysid.threads import single_threaded
 
 REWEIGHTINGS = 3
 """Of the joints, before the energy of their residuals is settled."""
@@ -46,23 +47,32 @@ class ErrorsInVariables(Estimator):
         margin: Fraction of a direction's energy that noise may explain at most.
     """
 
-    estimator: Estimator = field(default_factory=Ridge)
+    estimator: Estimator = field(default_factory=EmpiricalBayes)
     margin: float = 0.95
     name: ClassVar[str] = "eiv"
+    needs_input_noise: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if not 0.0 < self.margin < 1.0:
             raise ParameterError(f"errors in variables: margin must lie between 0 and 1; got {self.margin}")
 
-    @single_threaded()
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """Parameters without the attenuation by input noise; unseen directions stay at the prior."""
+        return self._estimate(moments, prior, self.estimator.estimate)
+
+    def estimate_among(self, moments: Moments, prior: Array | None, feasible: Feasible) -> Estimate:
+        """The same, possible parameters only."""
+        return self._estimate(moments, prior, partial(self.estimator.estimate_among, feasible=feasible))
+
+    def _estimate(
+        self, moments: Moments, prior: Array | None, estimate_from: Callable[[Moments, Array | None], Estimate]
+    ) -> Estimate:
         if moments.noise is None:
-            return dataclasses.replace(self.estimator.estimate(moments, prior), method=self.name)
+            return dataclasses.replace(estimate_from(moments, prior), method=self.name)
         theta0 = check_prior(moments, prior)
         limited = limit_noise(moments.shifted(theta0), self.margin)
         denoised = _with_noisy_residuals(limited.moments)
-        estimate = self.estimator.estimate(denoised.shifted(-theta0), prior)
+        estimate = estimate_from(denoised.shifted(-theta0), prior)
         level = _level_error(limited.moments, estimate, theta0)
         spread = estimate.spread
         if spread is not None:
@@ -82,7 +92,7 @@ class ErrorsInVariables(Estimator):
 
 @dataclass(frozen=True, eq=False)
 class LimitedNoise:
-    """Moments whose noise explains no direction to more than a margin.
+    """Moments whose noise explains no direction of any joint's rows to more than a margin.
 
     Attributes:
         moments: The same sums, with less noise where there was too much.
@@ -96,29 +106,27 @@ class LimitedNoise:
 
 
 def limit_noise(moments: Moments, margin: float) -> LimitedNoise:
-    """Take ``N - ½ (G M + Mᵀ G)`` for the noise N in ``Σ x xᵀ = G`` of every block and joint.
+    """Take ``N - ½ (G M + Mᵀ G)`` for the noise N in ``Σ x xᵀ = G`` of every block, joint by joint.
 
-    ``M = W (Λ - margin)₊ Wᵀ G`` with the pooled sums G and ``Wᵀ G W = 1``, ``Wᵀ N W = Λ``; pooled, the noise is then
-    no more than the margin in any direction, and untouched where it was not.
+    ``M = W (Λ - margin)₊ Wᵀ G`` with the joint's sums G over all blocks and ``Wᵀ G W = 1``, ``Wᵀ N W = Λ``. What is
+    left of each joint's sums is positive, and so is any weighted sum of the joints', by construction.
     """
     assert moments.noise is not None
-    weights = estimate_noise_std(moments) ** -2.0
-    gram, noise = moments.pooled(weights).xx, moments.pooled_noise(weights)[:-1, :-1]
-    whitened = _unit_directions(gram)
-    shares, turned = np.linalg.eigh(whitened.T @ noise @ whitened)
-    excess = shares > margin
-    heaviest = float(shares.max(initial=0.0))
-    if not excess.any():
-        return LimitedNoise(moments, heaviest, 0)
-    W = whitened @ turned[:, excess]
-    M = (W * (shares[excess] - margin)) @ W.T @ gram
-    sums, limited = moments.gram, np.array(moments.dense_noise)
-    product = sums[..., :-1, :-1] @ M
-    limited[..., :-1, :-1] -= 0.5 * (product + np.swapaxes(product, 2, 3))
-    dense = Moments.from_dense(
-        sums, moments.count, moments.columns, moments.joints, noise=limited, noise_error=moments.noise_error
-    )
-    return LimitedNoise(dense, heaviest, int(excess.sum()))
+    noise, heaviest, directions = [], 0.0, 0
+    for sums, own in zip(moments.squares, moments.noise, strict=True):
+        G, N = sums.sum(axis=0)[:-1, :-1], own.sum(axis=0)[:-1, :-1]
+        W = _unit_directions(G)
+        shares, turned = np.linalg.eigh(W.T @ N @ W)
+        excess = shares > margin
+        heaviest, directions = max(heaviest, float(shares.max(initial=0.0))), directions + int(excess.sum())
+        limited = own.copy()
+        if excess.any():
+            V = W @ turned[:, excess]
+            M = (V * (shares[excess] - margin)) @ V.T @ G
+            product = sums[:, :-1, :-1] @ M
+            limited[:, :-1, :-1] -= 0.5 * (product + np.swapaxes(product, 1, 2))
+        noise.append(limited)
+    return LimitedNoise(dataclasses.replace(moments, noise=tuple(noise)), heaviest, directions)
 
 
 def _with_noisy_residuals(moments: Moments) -> Moments:

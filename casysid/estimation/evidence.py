@@ -1,7 +1,7 @@
 """The evidence of a linear model with a size for every group of parameters and a variance for every joint's rows.
 
-Deviations ``δ = θ - θ0`` of a group are Gaussian with covariance ``λ_g K_g``: the shape ``K_g`` is known beforehand, the
-size ``λ_g`` maximises the evidence, as do the variances ``σ_j²`` with what the fit took away given back. The likelihood
+Deviations ``δ = θ - θ0`` of a group are Gaussian with covariance ``λ_g K_g``: the shape ``K_g`` is known beforehand,
+the size ``λ_g`` maximises the evidence, as do the variances ``σ_j²`` with what the fit took away given back. The likelihood
 is raised to the power ``1/κ``, because residuals are coloured and averaging windows overlap: ``κ`` is the variance of
 the blocks' scores over that of white residuals.
 
@@ -45,6 +45,7 @@ STEADY = 2e-2
 """Change of ``log λ`` that ends the search: a hundredth in a deviation."""
 LINKS, UNOWNED = "links", "columns"
 """Names of the groups that are measured from the prior; drives are measured from zero."""
+
 
 class Group(NamedTuple):
     """Parameters that share one size: a name for people, and their places."""
@@ -152,8 +153,9 @@ class EvidenceProblem:
             moved, delta = float(np.sqrt(max(step @ normal.xx @ step, 0.0))), new
             variance = self._variances(totals, delta, C)
             decided = np.array([self._decided(group, C, size) for group, size in zip(self.groups, sizes, strict=True)])
-            wanted = self._sizes(delta, C, decided, careful=iteration <= CAREFUL_ROUNDS)
-            change, sizes = float(np.abs(np.log(wanted / sizes)).max(initial=0.0)), wanted
+            wanted: Array = self._sizes(delta, C, decided, careful=iteration <= CAREFUL_ROUNDS)
+            change = float(np.abs(np.log(wanted / sizes)).max(initial=0.0))
+            sizes = wanted
             if iteration % INFLATION_EVERY == 1:
                 kappa = self._inflation(delta, variance)
             if iteration > INFLATION_EVERY and moved < tolerance and change < STEADY:
@@ -201,7 +203,7 @@ class EvidenceProblem:
             Q = self.precision[g[:, None], g]
             length = float(delta[g] @ Q @ delta[g])
             found.append((length + float(np.sum(Q * C[g[:, None], g]))) / len(g) if careful else length / gamma)
-        return np.clip(found, *SIZES)
+        return np.asarray(np.clip(np.array(found, dtype=np.float64), *SIZES))
 
     def _inflation(self, delta: Array, variance: Array) -> float:
         """``κ``, at least one: ``Σ ‖Wᵀ s_b‖² / (rank - Σ ‖Wᵀ I_b W‖²)`` over blocks, ``W`` whitening ``Σ I_b``."""
@@ -244,7 +246,7 @@ def inverse(matrix: Array) -> Array:
 
 
 def _shape(shifted: Moments, centre: Array) -> Array:
-    """``K``: of known bodies the geometry of their pseudo-inertias, of all else what explains a joint's torque alone."""
+    """``K``: of known bodies the geometry of their pseudo-inertias, of all else what explains a torque alone."""
     reach = np.zeros(len(centre))
     for own, sums in zip(shifted.row_columns, shifted.squares, strict=True):
         energy = np.maximum(np.einsum("bmm->m", sums), 0.0)

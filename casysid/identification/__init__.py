@@ -1,8 +1,8 @@
 """The pipeline: recordings in, identified parameters with their check out."""
 
 from casysid.identification.bands import torque_band
+from casysid.identification.choices import Choices
 from casysid.identification.comparison import Comparison, compare
-from casysid.identification.cutoff import CutoffChoice, choose_cutoff
 from casysid.identification.links import LinkProperties
 from casysid.identification.mistakes import Mistake, MistakeKind, find_mistakes
 from casysid.identification.pipeline import Preparation, identify, prepare, solve
@@ -10,10 +10,12 @@ from casysid.identification.prediction import TorqueError, torque_error
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 from casysid.identification.sources import Excitation, Sources
+from casysid.identification.tuning.band import BandChoice, choose_band
 
 __all__ = [
+    "BandChoice",
+    "Choices",
     "Comparison",
-    "CutoffChoice",
     "Excitation",
     "IdentificationResult",
     "LinkProperties",
@@ -23,7 +25,7 @@ __all__ = [
     "Settings",
     "Sources",
     "TorqueError",
-    "choose_cutoff",
+    "choose_band",
     "compare",
     "find_mistakes",
     "identify",

@@ -20,15 +20,12 @@ from scipy.optimize import nnls
 
 from casysid.arrays import Array
 from casysid.dynamics import Armature, Regressor, build_regressor
-from casysid.identification.problem import make_motion
-from casysid.recording import Recording
 from casysid.robot import JointKind, Robot
 from casysid.robot.coordinates import channels_from_configuration, configuration_from_channels
-from casysid.signals import low_passed, motion_band
+from casysid.signals import Motion, low_passed
 from casysid.threads import single_threaded
 
 SAMPLES, BLOCKS = 800, 12
-BAND_MARGIN, HIGHEST_SHARE_OF_RATE = 3.0, 0.2
 SHARPNESS = 0.01
 """Width of Coulomb friction's smooth sign in root mean square velocities."""
 RESOLUTION = 1e-4
@@ -155,38 +152,23 @@ class _Explanation:
 
 
 @single_threaded()
-def find_mistakes(robot: Robot, recordings: Sequence[Recording]) -> tuple[Mistake, ...]:
-    """Mistakes that the model file's own prediction shows in recordings; none when nothing is clear.
+def find_mistakes(robot: Robot, motions: Sequence[Motion], cutoff: float | None) -> tuple[Mistake, ...]:
+    """Mistakes that the model file's own prediction shows in motions; none when nothing is clear.
 
     Joints of several degrees of freedom are taken as logged. A change that no torque tells, as another zero of a joint
     with a vertical axis at the base, cannot be found.
     """
-    search = _Search(robot, recordings)
+    search = _Search(robot, motions, cutoff)
     found: list[Mistake] = []
     while len(found) < MOST and (mistake := search.next_mistake()) is not None:
         found.append(mistake)
     return (*found, *search.wrong_scales())
 
 
-def screening_cutoff(recordings: Sequence[Recording]) -> float | None:
-    """A low-pass above the motion's band [Hz]; None for samples without time."""
-    cutoffs = []
-    for recording in recordings:
-        if recording.time is None:
-            return None
-        band = float(motion_band(recording.time, recording.position, 0.95).max())
-        cutoffs.append(np.clip(BAND_MARGIN * band, BAND_MARGIN / recording.duration, _highest(recording)))
-    return float(np.median(cutoffs))
-
-
-def _highest(recording: Recording) -> float:
-    return HIGHEST_SHARE_OF_RATE * recording.rate
-
-
 class _Search:
     """Samples as read so far, and how well the file explains them."""
 
-    def __init__(self, robot: Robot, recordings: Sequence[Recording]) -> None:
+    def __init__(self, robot: Robot, motions: Sequence[Motion], cutoff: float | None) -> None:
         self._robot = robot
         self._regressor: Regressor = build_regressor(robot, friction=(Armature(),))
         self._places = {
@@ -195,7 +177,7 @@ class _Search:
             if joint.kind in (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
         }
         self._angles = [j.name for j in robot.joints if j.kind in (JointKind.REVOLUTE, JointKind.CONTINUOUS)]
-        self._samples = _pick(robot, recordings)
+        self._samples = _pick(robot, motions, cutoff)
         self._blocks = np.array_split(np.arange(len(self._samples.tau)), BLOCKS)
         self._width = SHARPNESS * np.sqrt(np.mean(self._samples.v**2, axis=0)) + 1e-12
         self._now = self._explain(self._samples)
@@ -318,13 +300,11 @@ class _Search:
         return float(np.mean(1.0 - explanation.energy[dofs] / np.maximum(size, 1e-30)))
 
 
-def _pick(robot: Robot, recordings: Sequence[Recording]) -> _Samples:
-    """Some samples, evenly over the recordings, motion and torque behind the same low-pass."""
-    cutoff = screening_cutoff(recordings)
-    each = max(SAMPLES // len(recordings), BLOCKS)
+def _pick(robot: Robot, motions: Sequence[Motion], cutoff: float | None) -> _Samples:
+    """Some samples, evenly over the motions, their torque behind a low-pass."""
+    each = max(SAMPLES // len(motions), BLOCKS)
     parts = []
-    for recording in recordings:
-        motion = make_motion(robot, recording, cutoff)
+    for motion in motions:
         tau = motion.tau if cutoff is None else low_passed(motion.time, motion.tau, cutoff)
         rows = np.unique(np.linspace(0, len(motion) - 1, each).astype(np.intp))
         position = channels_from_configuration(robot, motion.q[rows])

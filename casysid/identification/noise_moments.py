@@ -14,24 +14,51 @@ Source: Cook and Stefanski 1994 (simulation-extrapolation); Berkson 1950.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.dynamics import Coulomb, LoadedCoulomb, PowerViscous, Regressor, Stribeck
+from casysid.dynamics import Coulomb, LoadedCoulomb, MaxwellSlip, PowerViscous, Regressor, Stribeck
 from casysid.errors import ParameterError
+from casysid.identification.passes import Passes
 from casysid.moments import Moments
 from casysid.recording import Recording
-from casysid.signals import InputNoise
+from casysid.signals import InputNoise, NoiseLevels, find_input_noise, mean_input_noise
 
 DRAWS = 2
 """Pairs of opposite noise whose growth is averaged, where the positions are smoothed."""
 LONG = 50_000
 """So many samples average well enough by themselves: one pair will do."""
 DRAWS_AS_LOGGED = 4
-EXPECTED_KINDS = (Coulomb.kind, LoadedCoulomb.kind, PowerViscous.kind, Stribeck.kind)
+EXPECTED_KINDS = (Coulomb.kind, LoadedCoulomb.kind, PowerViscous.kind, Stribeck.kind, MaxwellSlip.kind)
 """Columns that are an expectation, given the noisy motion, and not a noisy value."""
+
+
+def with_noise(
+    moments: Moments, regressor: Regressor, passes: Passes, levels: NoiseLevels
+) -> tuple[Moments, InputNoise | None]:
+    """Moments that know what noise of the measured motion has added to them, and that noise; as they are if unknown.
+
+    Args:
+        moments: Of the passes' recordings.
+        regressor: Whose columns were summed.
+        passes: Over what is fitted.
+        levels: What is known of the sensors.
+    """
+    as_logged = passes.band.cutoff is None
+    recordings = [one.in_memory() for one in passes.recordings]
+    noise = tuple(find_input_noise(one, levels, as_logged=as_logged) for one in recordings)
+    together = mean_input_noise(noise)
+    if together is None:
+        return moments, None
+
+    def sums_of(disturbed: Sequence[Recording]) -> Moments:
+        return passes.disturbed(disturbed).moments(regressor)
+
+    added = noise_moments(regressor, recordings, noise, moments, sums_of, as_logged=as_logged)
+    return dataclasses.replace(moments, noise=added, noise_error=together.relative_error), together
 
 
 def noise_moments(
@@ -76,7 +103,7 @@ def noise_moments(
     added = growth(1.0)
     if as_logged:
         return tuple(3.0 * once - twice for once, twice in zip(added, growth(np.sqrt(2.0)), strict=True))
-    expected = [m for m, parameter in enumerate(regressor.parameters) if parameter.kind in EXPECTED_KINDS]
+    expected = [m for m, parameter in enumerate(regressor.parameters) if parameter.kind.startswith(EXPECTED_KINDS)]
     for columns, own in zip(moments.row_columns, added, strict=True):
         places = np.flatnonzero(np.isin(columns, expected))
         own[:, places, :] = own[:, :, places] = 0.0

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
+from itertools import repeat
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
@@ -25,6 +26,9 @@ low-pass, and a wrong sharp turn costs more than a blunt one (``scripts/benchmar
 NEAR_REST = 2.5
 """A joint slower than so many widths is near rest: beyond, the smooth sign is within 1.4 % of one."""
 MINIMUM_BLOCKS = 4
+"""Of every recording: the fewest of which folds and scores tell anything."""
+
+Mask = npt.NDArray[np.bool_]
 
 
 class Passes:
@@ -39,7 +43,14 @@ class Passes:
     """
 
     def __init__(
-        self, robot: Robot, recordings: Sequence[Source], band: BandChoice, *, blocks: int = 20, threads: int = 2
+        self,
+        robot: Robot,
+        recordings: Sequence[Source],
+        band: BandChoice,
+        *,
+        delays: Array | None = None,
+        blocks: int = 20,
+        threads: int = 2,
     ) -> None:
         """Nothing is done yet.
 
@@ -47,18 +58,21 @@ class Passes:
             robot: The robot.
             recordings: At least one.
             band: Cut-offs.
+            delays: By which each degree of freedom's torque is late, shape (nv,), [s].
             blocks: Blocks of time in all.
             threads: Of the regressor's evaluation.
         """
         self.robot, self.recordings, self.band = robot, tuple(recordings), band
         self.smoothings = self.passes = 0
-        self._blocks, self._threads = blocks, threads
+        self._delays, self._blocks, self._threads = delays, blocks, threads
 
     @cached_property
     def motions(self) -> tuple[Motion, ...]:
         """The recordings smoothed, at all their samples."""
         self.smoothings += 1
-        return tuple(motion_from_recording(self.robot, one, self.band.smoothing) for one in self.recordings)
+        return tuple(
+            motion_from_recording(self.robot, one, self.band.smoothing, delays=self._delays) for one in self.recordings
+        )
 
     @cached_property
     def sparse_motions(self) -> tuple[Motion, ...]:
@@ -73,54 +87,49 @@ class Passes:
     @cached_property
     def speed(self) -> Array:
         """Root mean square velocity of each degree of freedom, shape (nv,)."""
-        return np.sqrt(np.mean([np.mean(motion.v**2, axis=0) for motion in self.sparse_motions], axis=0))
+        return np.asarray(np.sqrt(np.mean([np.mean(motion.v**2, axis=0) for motion in self.sparse_motions], axis=0)))
 
     @cached_property
     def travel(self) -> Array:
         """Standard deviation of the position of each degree of freedom within a recording, shape (nv,)."""
         spread = [np.var(continued_positions(self.robot, motion.q), axis=0) for motion in self.sparse_motions]
-        return np.sqrt(np.mean(spread, axis=0))
+        return np.asarray(np.sqrt(np.mean(spread, axis=0)))
 
     @cached_property
     def width(self) -> Array:
         """Within which smooth signs turn, shape (nv,)."""
         return np.maximum(RELATIVE_WIDTH * self.speed, np.finfo(np.float64).eps)
 
+    @cached_property
+    def near_rest(self) -> tuple[Mask, ...] | None:
+        """When each joint stands or turns round, in the sparse motions, shape (N, nv) each; None without time."""
+        if self.band.cutoff is None:
+            return None
+        slow = NEAR_REST * self.width
+        return tuple(motion.standing | (np.abs(motion.v) < slow) for motion in self.sparse_motions)
+
     def blocks_of_each(self) -> int:
         """Blocks of time of every recording."""
         return max(MINIMUM_BLOCKS, -(-self._blocks // len(self.recordings)))
 
-    def moments(self, regressor: Regressor, *, near_rest_apart: bool = True) -> Moments:
-        """One pass: moments of all recordings, their blocks one after the other.
-
-        Args:
-            regressor: Gives the columns.
-            near_rest_apart: Whether equations of a joint near rest are rows of their own.
-        """
+    def moments(self, regressor: Regressor) -> Moments:
+        """One pass: moments of all recordings, their blocks one after the other, equations near rest apart."""
         self.passes += 1
         return sum_moments(
             regressor,
             self.sparse_motions,
             self.band.cutoff,
-            near_rest=NEAR_REST * self.width if near_rest_apart else None,
+            near_rest=self.near_rest,
             blocks=self.blocks_of_each(),
             threads=self._threads,
         )
 
-    def visit(self, look: Callable[[Motion], None]) -> None:
-        """One pass over the motions at all their samples."""
-        self.passes += 1
-        for motion in self.motions:
-            look(motion)
-
     def disturbed(self, recordings: Sequence[Source]) -> Passes:
-        """Passes over other recordings of the same robot in the same band, with the same stands."""
-        other = Passes(self.robot, recordings, self.band, blocks=self._blocks, threads=self._threads)
-        other.__dict__["motions"] = tuple(
-            dataclasses.replace(motion, standing=mine.standing)
-            for motion, mine in zip(other.motions, self.motions, strict=True)
+        """Passes over the same recordings with other noise: the same equations are near rest."""
+        other = Passes(
+            self.robot, recordings, self.band, delays=self._delays, blocks=self._blocks, threads=self._threads
         )
-        other.__dict__["width"] = self.width
+        other.__dict__["near_rest"] = self.near_rest
         return other
 
 
@@ -129,7 +138,7 @@ def sum_moments(
     motions: Sequence[Motion],
     cutoff: float | None,
     *,
-    near_rest: Array | None = None,
+    near_rest: Sequence[Mask] | None = None,
     blocks: int = MINIMUM_BLOCKS,
     threads: int = 2,
 ) -> Moments:
@@ -139,7 +148,7 @@ def sum_moments(
         regressor: Gives the columns.
         motions: At least one.
         cutoff: Of the equations' average [Hz]; None sums them as they are.
-        near_rest: Velocity below which a joint's equations are rows of their own, shape (nv,); None keeps them together.
+        near_rest: When a joint's equations are rows of their own, shape (N, nv) by motion; None keeps them together.
         blocks: Of each motion.
         threads: Of the evaluation.
     """
@@ -151,11 +160,11 @@ def sum_moments(
             motion.a,
             motion.tau,
             average=None if cutoff is None else BandAverage(motion.time, cutoff),
-            near_rest=None if near_rest is None or cutoff is None else motion.standing | (np.abs(motion.v) < near_rest),
+            near_rest=mask,
             blocks=blocks,
             threads=threads,
         )
-        for motion in motions
+        for motion, mask in zip(motions, near_rest or repeat(None), strict=False)
     ]
     total = parts[0]
     for part in parts[1:]:

@@ -33,7 +33,7 @@ from casysid.moments import Moments
 from casysid.projection import ProjectionProblem, ProjectionResult, build_projection, possible_parameters, project
 from casysid.recording import Source
 from casysid.robot import Robot
-from casysid.signals import InputNoise, Motion, aligned, motion_from_recording
+from casysid.signals import InputNoise, Motion
 from casysid.threads import single_threaded
 from casysid.uncertainty import ParameterUncertainty, propagate
 
@@ -136,8 +136,8 @@ def prepare(
     if noise_too or settings.method.needs_input_noise:
         moments, noise = with_noise(moments, regressor, passes, settings.input_noise)
     scale, delay, band = chosen.choices.clock.scale, chosen.choices.delay, chosen.choices.band
-    unseen = [aligned(one.with_time_scaled(scale), delay.seconds) for one in held_out]
-    predicted = tuple(motion_from_recording(robot, one, band.smoothing) for one in unseen)
+    unseen = [one.with_time_scaled(scale) for one in held_out]
+    predicted = Passes(robot, unseen, band, delays=delay.seconds).motions if unseen else ()
     structural = structural_base_parameters(regressor)
     clock.lap("moments")
     progress("moments", 1.0)
@@ -248,7 +248,7 @@ def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, prog
     progress("tuning", 0.5)
     delay = choose_delay(passes, candidates.base, settings.delay)
     if not delay.is_none:
-        passes, candidates = _gather(robot, [aligned(one, delay.seconds) for one in recordings], band, settings)
+        passes, candidates = _gather(robot, recordings, band, settings, delay.seconds)
         work.append(passes)
     progress("tuning", 0.7)
     friction = select_friction(candidates, settings) if candidates.proposals else FrictionChoice(settings)
@@ -281,9 +281,9 @@ def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, prog
 
 
 def _gather(
-    robot: Robot, recordings: Sequence[Source], band: BandChoice, settings: Settings
+    robot: Robot, recordings: Sequence[Source], band: BandChoice, settings: Settings, delays: Array | None = None
 ) -> tuple[Passes, Candidates]:
-    passes = Passes(robot, recordings, band, blocks=settings.blocks, threads=settings.threads)
+    passes = Passes(robot, recordings, band, delays=delays, blocks=settings.blocks, threads=settings.threads)
     return passes, gather_candidates(passes, settings)
 
 

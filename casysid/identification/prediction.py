@@ -48,7 +48,7 @@ def torque_error(
 ) -> TorqueError:
     """Predict each motion's torque and compare, below ``cutoff`` [Hz] and as logged."""
     missed = felt = 0.0
-    times, measured, predictions = [], [], []
+    times, measured, predictions = list[Array](), list[Array](), list[Array]()
     for motion in motions:
         predicted = regressor.predict(parameters, motion.q, motion.v, motion.a, time=motion.time)
         inner = motion.settled if motion.settled.any() else np.ones(len(motion), dtype=bool)

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.arrays import Array
 from casysid.dynamics import Regressor
 from casysid.estimation import Estimate, Status
 from casysid.identifiability import BaseParameters
-from casysid.identification.cutoff import CutoffChoice
-from casysid.identification.delay import DelayChoice
-from casysid.identification.friction_choice import FrictionChoice
+from casysid.identification.choices import Choices
 from casysid.identification.friction_laws import broken_laws
 from casysid.identification.friction_model import model_to_json
 from casysid.identification.links import LinkProperties, link_properties
@@ -24,8 +22,11 @@ from casysid.identification.mistakes import Mistake
 from casysid.identification.prediction import TorqueError
 from casysid.identification.settings import Settings
 from casysid.identification.sources import Sources, sources_of
-from casysid.identification.time_base import TimeBase
-from casysid.identification.torque_gains import TorqueGains
+from casysid.identification.tuning.band import BandChoice
+from casysid.identification.tuning.clock import TimeBase
+from casysid.identification.tuning.delay import DelayChoice
+from casysid.identification.tuning.drive_gains import DriveGains
+from casysid.identification.tuning.friction_selection import FrictionChoice
 from casysid.inertia import smallest_eigenvalue
 from casysid.moments import Moments
 from casysid.projection import ProjectionResult
@@ -43,12 +44,7 @@ class IdentificationResult:
     Attributes:
         robot: The robot as its file describes it.
         settings: What was asked for.
-        time_base: What was found of the recordings' clock.
-        mistakes: What in the recordings contradicts the model file, if anything; nothing was changed for it.
-        cutoff: The low-pass and why.
-        delay: How late the torque was; taken out of all motions here, fitted and held out alike.
-        friction: What the data added to the friction that was asked for.
-        torque_gains: Of the joints relative to each other, and why.
+        choices: What was chosen from the data, each with its evidence.
         regressor: Of which ``parameters`` are the coefficients.
         moments: Of the fitted recordings.
         estimate: The unconstrained estimate.
@@ -69,12 +65,7 @@ class IdentificationResult:
 
     robot: Robot
     settings: Settings
-    time_base: TimeBase
-    mistakes: tuple[Mistake, ...]
-    cutoff: CutoffChoice
-    delay: DelayChoice
-    friction: FrictionChoice
-    torque_gains: TorqueGains
+    choices: Choices
     regressor: Regressor
     moments: Moments
     estimate: Estimate
@@ -95,6 +86,57 @@ class IdentificationResult:
     def parameters(self) -> Array:
         """The answer, shape (p,): the projection's if there was one, else the estimate's."""
         return self.estimate.parameters if self.projection is None else self.projection.parameters
+
+    @property
+    def time_base(self) -> TimeBase:
+        """What was found of the recordings' clock."""
+        return self.choices.clock
+
+    @property
+    def mistakes(self) -> tuple[Mistake, ...]:
+        """What in the recordings contradicts the model file, if anything; nothing was changed for it."""
+        return self.choices.mistakes
+
+    @property
+    def cutoff(self) -> BandChoice:
+        """The low-pass and why."""
+        return self.choices.band
+
+    @property
+    def delay(self) -> DelayChoice:
+        """How late the torque was; taken out of all motions here, fitted and held out alike."""
+        return self.choices.delay
+
+    @property
+    def torque_delay(self) -> Array:
+        """By how much the torque was logged later than the motion, shape (nv,), [s]."""
+        return self.choices.delay.seconds
+
+    @property
+    def friction(self) -> FrictionChoice:
+        """What the data added to the friction that was asked for."""
+        return self.choices.friction
+
+    @property
+    def torque_gains(self) -> DriveGains:
+        """Of the joints relative to each other, and why."""
+        return self.choices.gains
+
+    def predict_torque(self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike) -> Array:
+        """Torque along a motion, shape (N, nv), as it would be logged but for the delay.
+
+        Friction before sliding remembers the way that the joints have gone, so the samples must follow each other in
+        time; before the first one everything is slack.
+
+        Args:
+            q: Configurations, shape (N, nq).
+            v: Velocities, shape (N, nv).
+            a: Accelerations, shape (N, nv).
+
+        Raises:
+            ParameterError: A shape does not fit.
+        """
+        return self.regressor.predict(self.parameters, q, v, a)
 
     @property
     def status(self) -> Status:
@@ -178,20 +220,7 @@ class IdentificationResult:
             "samples": {"train": self.train.samples, "held_out": held_out.samples if held_out else 0},
             "seconds": round(sum(self.seconds.values()), 3),
             "flip": list(self.settings.flip),
-            "time_base": dataclasses.asdict(self.time_base),
-            "torque_gains": {
-                "gains": dict(zip(by_joint, self.torque_gains.values.tolist(), strict=True)),
-                "std": dict(zip(by_joint, self.torque_gains.error.tolist(), strict=True)),
-                "reason": self.torque_gains.reason,
-            },
-            "cutoff": {
-                "hz": self.cutoff.cutoff,
-                "equations_hz": self.cutoff.fitted,
-                "motion_band_hz": self.cutoff.motion_band,
-                "reason": self.cutoff.reason,
-            },
-            "mistakes": [mistake.to_json() for mistake in self.mistakes],
-            "delay": self.delay.to_json(by_joint),
+            **self.choices.to_json(by_joint),
             "relative_error": {
                 "train": self.train.relative,
                 "held_out": held_out.relative if held_out else None,

@@ -28,8 +28,8 @@ class Settings:
         friction: Kinds of friction and drive columns of every joint.
         choose_friction: Whether the data may add kinds of friction, joint by joint, and couplings of neighbours; only
             with time stamps.
-        coulomb_width: Velocity within which Coulomb's smooth sign turns [rad/s, m/s]; None takes a share of each joint's
-            root mean square velocity.
+        coulomb_width: Velocity within which Coulomb's smooth sign turns [rad/s, m/s]; None takes a share of each
+            joint's root mean square velocity.
         couplings: Transmissions that link joints, such as a wrist driven by two motors.
         time_scale: Time stamps times this are seconds; None looks whether inertial torques contradict the clock.
         quasi_static: Torques hold no inertial part, gravity and friction explain them; None lets the data decide.

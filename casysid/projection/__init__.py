@@ -4,7 +4,7 @@ IPOPT minimises over virtual parameters, in which every real vector is consisten
 consistent parameters is convex: Clarabel finds its global optimum, which certifies IPOPT's answer or takes its place.
 """
 
-from casysid.projection.api import constrained_least_squares, possible_parameters, project
+from casysid.projection.api import constrained_least_squares, convex_least_squares, possible_parameters, project
 from casysid.projection.knowledge import (
     KeptLink,
     Knowledge,
@@ -33,6 +33,7 @@ __all__ = [
     "build_projection",
     "center_of_mass_within",
     "constrained_least_squares",
+    "convex_least_squares",
     "link_mass",
     "parameter_within",
     "possible_parameters",

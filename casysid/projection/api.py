@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from casysid.arrays import Array
-from casysid.errors import ParameterError
+from casysid.errors import ParameterError, SolverError
 from casysid.moments import NormalEquations
 from casysid.nlp import Progress
 from casysid.projection.certificate import USUAL_WEIGHT, certify
@@ -75,6 +75,21 @@ def constrained_least_squares(
             f"projection: the moments have {equations.xx.shape[0]} columns, the problem {len(problem.layout)}"
         )
     return solve_task(task_of(problem, misfit_of_equations(equations), prior), progress)
+
+
+def convex_least_squares(
+    problem: ProjectionProblem, equations: NormalEquations, prior: npt.ArrayLike | None = None
+) -> Array:
+    """As :func:`constrained_least_squares`, by the convex solver alone: for searches that solve often.
+
+    Raises:
+        SolverError: The convex solver has no answer.
+    """
+    task = task_of(problem, misfit_of_equations(equations), prior)
+    certificate = certify(task, USUAL_WEIGHT)
+    if certificate is None:
+        raise SolverError("projection: the convex solver found no consistent parameters; look at the moments")
+    return np.asarray(task.frame.transform @ certificate.scaled)
 
 
 def possible_parameters(

@@ -247,6 +247,10 @@ class Recording(Source):
             raise ParameterError(f"decimated: factor must be a positive whole number; got {factor}")
         return self.selected(slice(None, None, int(factor)))
 
+    def in_memory(self) -> Recording:
+        """Itself."""
+        return self
+
     def summary(self) -> RecordingSummary:
         """What there is, in figures."""
         return RecordingSummary(

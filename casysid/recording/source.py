@@ -120,6 +120,10 @@ class Source(ABC):
         """All samples in their order, in consecutive recordings of at most ``rows`` rows."""
 
     @abstractmethod
+    def in_memory(self) -> Recording:
+        """All samples at once."""
+
+    @abstractmethod
     def summary(self) -> RecordingSummary:
         """What there is, in figures."""
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from casysid.identification import IdentificationResult
 from casysid.identification.verdict import judge
-from casysid.report.pictures import cutoff_figure, inline_png, torque_figure
+from casysid.report.pictures import inline_png, torque_figure
 from casysid.report.tables import (
     Table,
     choice_table,
@@ -82,7 +82,7 @@ def _sections(result: IdentificationResult) -> list[Section]:
     sections = [
         Section(
             "Torque error",
-            "‖measured − predicted‖ / ‖measured‖. Torque is seen through the same low-pass as the motion; the second "
+            "‖measured − predicted‖ / ‖measured‖, in a band derived from the motion alone; the second "
             "line is against the torque as logged.",
             table=error_table(result),
         ),
@@ -122,9 +122,5 @@ def _sections(result: IdentificationResult) -> list[Section]:
                 "Signs, units or orders of columns that would explain the log far better. Nothing was changed for it.",
                 table=mistake_table(result.mistakes),
             ),
-        )
-    if len(result.cutoff.candidates):
-        sections.append(
-            Section("Choice of the low-pass", result.cutoff.reason, picture=inline_png(cutoff_figure(result)))
         )
     return sections

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from casysid.dynamics import build_regressor
 from casysid.identifiability import structural_base_parameters
-from casysid.identification.mistakes import find_mistakes
+from casysid.identification import choose_band, find_mistakes
+from casysid.identification.passes import Passes
 from casysid.inertia import mass_properties, smallest_eigenvalue
 from casysid.recording import Source
 from casysid.report.tables import Table, mistake_table, number
@@ -40,7 +41,9 @@ def recording_tables(robot: Robot, recording: Source) -> list[tuple[str, Table]]
 
 
 def _against_file(robot: Robot, recording: Source) -> Table:
-    mistakes = find_mistakes(robot, recording.excerpts())
+    excerpts = recording.excerpts()
+    passes = Passes(robot, excerpts, choose_band(excerpts))
+    mistakes = find_mistakes(robot, passes.sparse_motions, passes.band.cutoff)
     return mistake_table(mistakes) if mistakes else Table(("",), (("nothing looks wrong",),))
 
 

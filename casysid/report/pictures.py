@@ -47,36 +47,22 @@ def torque_figure(result: IdentificationResult) -> Any:
     """Measured and predicted torque of each joint with its 95 % band, over the first held-out or else fitted motion."""
     error = result.held_out or result.train
     motion: Motion = (result.held_out_motions or result.train_motions)[0]
-    measured, predicted = error.measured[0], error.predictions[0]
+    time, measured, predicted = error.times[0], error.measured[0], error.predictions[0]
     band = torque_band(result, motion)
-    pick = slice(None, None, max(1, len(motion) // MOST_POINTS))
+    band = np.column_stack([np.interp(time, motion.time, own) for own in band.T])
+    pick = slice(None, None, max(1, len(time) // MOST_POINTS))
     canvas, axes = figure(9.5, 1.0 + 1.35 * len(result.robot.dofs), len(result.robot.dofs))
     for k, (ax, dof) in enumerate(zip(axes, result.robot.dofs, strict=True)):
-        ax.plot(motion.time[pick], measured[pick, k], color=MEASURED, linewidth=2.4, label="measured, low-passed")
+        ax.plot(time[pick], measured[pick, k], color=MEASURED, linewidth=2.4, label="measured, low-passed")
         lower, upper = predicted[pick, k] - band[pick, k], predicted[pick, k] + band[pick, k]
-        ax.fill_between(motion.time[pick], lower, upper, color=BAND, linewidth=0.0, label="95 % band")
-        ax.plot(motion.time[pick], predicted[pick, k], color=PREDICTED, linewidth=1.0, label="predicted")
-        ax.plot(motion.time[pick], (measured - predicted)[pick, k], color=RESIDUAL, linewidth=0.7, label="difference")
+        ax.fill_between(time[pick], lower, upper, color=BAND, linewidth=0.0, label="95 % band")
+        ax.plot(time[pick], predicted[pick, k], color=PREDICTED, linewidth=1.0, label="predicted")
+        ax.plot(time[pick], (measured - predicted)[pick, k], color=RESIDUAL, linewidth=0.7, label="difference")
         _limit(ax, measured[:, k], predicted[:, k])
         ax.set_ylabel(f"{dof}\n{torque_unit(result.robot, k)}", fontsize=8)
     axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=4, frameon=False, fontsize=8)
     axes[-1].set_xlabel("time [s]")
     canvas.align_ylabels(axes)
-    return canvas
-
-
-def cutoff_figure(result: IdentificationResult) -> Any:
-    """Cross-validated torque error over the cut-offs that were tried."""
-    choice = result.cutoff
-    canvas, (ax,) = figure(6.0, 2.6)
-    ax.semilogx(choice.candidates, 100.0 * choice.error, "o-", color=PREDICTED, markersize=4)
-    ax.axvline(choice.cutoff, color=RESIDUAL, linewidth=1.0)
-    ax.axvspan(0.5 * max(choice.motion_band, 1e-3), choice.motion_band, color="#e5e8eb", zorder=0)
-    ax.set_xticks(choice.candidates[::2], [f"{value:.3g}" for value in choice.candidates[::2]])
-    ax.minorticks_off()
-    ax.set_ylim(0, 1.1 * 100.0 * float(np.quantile(choice.error, 0.9)))
-    ax.set_xlabel("low-pass cut-off [Hz]  (shaded: up to the motion's band)")
-    ax.set_ylabel("cross-validated\ntorque error [%]")
     return canvas
 
 

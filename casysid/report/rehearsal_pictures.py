@@ -43,14 +43,15 @@ def write_png(canvas: Any, path: Path) -> Path:
 
 def rehearsed_torque_figure(rehearsal: Rehearsal) -> Any:
     """Torque as logged on the unseen motion, and as the model file and the identified parameters predict it."""
-    result, motion = rehearsal.result, rehearsal.result.held_out_motions[0]
-    shown = _first_seconds(motion.time)
+    result = rehearsal.result
+    times = result.file.times[0]
+    shown = _first_seconds(times)
     file, measured = result.file.predictions[0], result.file.measured[0]
     predicted = (result.held_out or result.train).predictions[0]
     dofs = result.robot.dofs
     canvas, axes = figure(9.5, 1.0 + 1.35 * len(dofs), len(dofs))
     for k, (ax, dof) in enumerate(zip(axes, dofs, strict=True)):
-        time = motion.time[shown]
+        time = times[shown]
         ax.plot(time, measured[shown, k], color=MEASURED, linewidth=2.2, label="measured")
         ax.plot(time, file[shown, k], color=RESIDUAL, linewidth=0.8, label="predicted by the model file")
         ax.plot(time, predicted[shown, k], color=PREDICTED, linewidth=1.0, label="predicted by identified parameters")

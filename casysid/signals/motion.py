@@ -174,11 +174,18 @@ def motion_pieces(
 
 
 @single_threaded()
-def motion_from_recording(robot: Robot, recording: Source, cutoff: float | None, gap: float | None = None) -> Motion:
+def motion_from_recording(
+    robot: Robot,
+    recording: Source,
+    cutoff: float | None,
+    gap: float | None = None,
+    delays: Array | None = None,
+) -> Motion:
     """The recording's positions smoothed at ``cutoff`` [Hz] and differentiated; each stretch between gaps by itself.
 
     Motion is taken ``recording.torque_delay`` earlier than the torque's time stamp, as it was when the torque acted.
-    A gap is a step of time longer than ``gap`` [s]; None: :func:`longest_bridge`.
+    A gap is a step of time longer than ``gap`` [s]; None: :func:`longest_bridge`. Each degree of freedom's torque is
+    late by ``delays`` more, shape (nv,), [s].
 
     Unordered samples (no time), and timed ones with ``cutoff`` None that carry velocity and acceleration, are taken as
     logged. Logged velocities are otherwise not used: the spline's derivatives of the position are consistent with it.
@@ -186,7 +193,8 @@ def motion_from_recording(robot: Robot, recording: Source, cutoff: float | None,
     Raises:
         RecordingError: Samples to be taken as logged lack velocity or acceleration, or no stretch is long enough.
     """
-    parts = [piece.motion for piece in motion_pieces(robot, recording, cutoff, gap=gap, rows=max(len(recording), 1))]
+    rows = max(len(recording), 1)
+    parts = [piece.motion for piece in motion_pieces(robot, recording, cutoff, gap=gap, delays=delays, rows=rows)]
     if not parts:
         raise RecordingError(
             f"{recording.label}: no {MINIMUM_SAMPLES} samples between gaps in time, so nothing can be differentiated"

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.dynamics import DEFAULT_FRICTION, Coupling, FrictionModel, Regressor, build_regressor
+from casysid.dynamics import DEFAULT_FRICTION, Coupling, FrictionModel, Regressor, build_regressor, with_width
 from casysid.errors import ParameterError
-from casysid.identification import CutoffChoice, Settings, TorqueError, choose_cutoff, torque_error
-from casysid.identification.problem import USUAL_WIDTH, make_motion, with_widths
-from casysid.recording import Recording
+from casysid.identification import BandChoice, TorqueError, choose_band, torque_error
+from casysid.identification.passes import Passes
+from casysid.recording import Source
 from casysid.robot import Robot
-from casysid.signals import aligned
 from casysid.threads import single_threaded
 from casysid.validation.earlier import Drives, EarlierResult
 
@@ -33,7 +32,7 @@ class Validation:
     """
 
     robot: Robot
-    cutoff: CutoffChoice
+    cutoff: BandChoice
     parameters: Array
     regressor: Regressor
     total: TorqueError
@@ -64,7 +63,7 @@ class Validation:
 @single_threaded()
 def validate(
     robot: Robot,
-    recordings: Sequence[Recording],
+    recordings: Sequence[Source],
     *,
     earlier: EarlierResult | None = None,
     cutoff: float | None = None,
@@ -76,7 +75,7 @@ def validate(
         robot: Its links' parameters are judged, and its friction unless ``earlier`` says otherwise.
         recordings: At least one.
         earlier: Friction, offset, armature and how recordings are read, for which the file has no place.
-        cutoff: Low-pass [Hz] of motion and torque; None takes the earlier result's, else lets the data choose.
+        cutoff: Low-pass [Hz] of motion and torque; None takes the earlier result's, else derives it from the motion.
         progress: Told the stage and the share done.
 
     Raises:
@@ -86,37 +85,30 @@ def validate(
         raise ParameterError("validate: at least one recording is needed; got none")
     earlier = earlier or EarlierResult()
     model = earlier.friction or FrictionModel(DEFAULT_FRICTION, _couplings(robot, earlier.drives))
-    settings = Settings(
-        cutoff=cutoff or earlier.cutoff,
-        friction=model.columns,
+    late = np.array([earlier.delays.get(dof, 0.0) for dof in robot.dofs])
+    recordings = [recording.flipped(earlier.flip).with_time_scaled(earlier.time_scale) for recording in recordings]
+    choice = choose_band(recordings, cutoff or earlier.cutoff)
+    progress("predict", 0.0)
+    passes = Passes(robot, recordings, choice, delays=late)
+    motions, friction = passes.motions, model.columns
+    if earlier.friction is None:
+        friction = with_width(friction, tuple(passes.width.tolist()))
+    regressor = build_regressor(
+        robot,
+        friction=friction,
         couplings=model.couplings,
         quasi_static=earlier.quasi_static,
         torque_gains=tuple(earlier.torque_gains.get(dof, 1.0) for dof in robot.dofs),
     )
-    late = np.array([earlier.delays.get(dof, 0.0) for dof in robot.dofs])
-    read = (recording.flipped(earlier.flip).with_time_scaled(earlier.time_scale) for recording in recordings)
-    recordings = [aligned(recording, late) for recording in read]
-    choice = choose_cutoff(robot, recordings, settings, progress=lambda share: progress("cut-off", share))
-    progress("predict", 0.0)
-    motions = [make_motion(robot, recording, choice.cutoff) for recording in recordings]
-    if earlier.friction is None:
-        settings = replace(settings, friction=with_widths(settings, motions, USUAL_WIDTH))
-    regressor = build_regressor(
-        robot,
-        friction=settings.friction,
-        couplings=settings.couplings,
-        quasi_static=earlier.quasi_static,
-        torque_gains=settings.torque_gains,
-    )
     parameters = parameters_with_drives(regressor, earlier.drives)
-    errors = [torque_error(regressor, parameters, [motion], choice.cutoff) for motion in motions]
+    errors = [torque_error(regressor, parameters, [motion], choice.errors) for motion in motions]
     progress("predict", 1.0)
     return Validation(
         robot=robot,
         cutoff=choice,
         parameters=parameters,
         regressor=regressor,
-        total=torque_error(regressor, parameters, motions, choice.cutoff),
+        total=torque_error(regressor, parameters, motions, choice.errors),
         by_recording=tuple((recording.label, error) for recording, error in zip(recordings, errors, strict=True)),
     )
 

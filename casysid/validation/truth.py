@@ -11,7 +11,6 @@ from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor, build_regressor
 from casysid.estimation.covariance import block_covariance
 from casysid.identification import IdentificationResult
-from casysid.identification.problem import sum_moments
 from casysid.simulation import Plant, SimulatedRun
 from casysid.threads import single_threaded
 
@@ -75,11 +74,10 @@ def true_coefficients(plant: Plant, regressor: Regressor) -> Array:
 def compare_base_parameters(result: IdentificationResult, plant: Plant) -> BaseComparison:
     """An identification's base parameters beside those of the plant it was made on."""
     base, regressor = result.structural, result.regressor
-    moments = sum_moments(regressor, result.train_motions, result.cutoff.cutoff, result.settings)
-    leading = moments.select_columns(base.independent)  # with β = B θ the torque is that of these alone
+    leading = result.moments.select_columns(base.independent)  # with β = B θ the torque is that of these alone
     weights = result.estimate.noise_std**-2.0
     fitted = base.transform @ result.estimate.parameters
-    energy = np.diag(leading.pooled().xx) / max(float(leading.count[:, 0].sum()), 1.0)
+    energy = np.diag(leading.pooled().xx) / max(float(leading.count.sum() / len(plant.robot.dofs)), 1.0)
     return BaseComparison(
         names=base.words(),
         true=base.transform @ true_coefficients(plant, regressor),

@@ -25,7 +25,7 @@ EQUATIONS_IN_MOTION = 6.0
 """Cut-off of the equations over the motion's band. Accelerations and products of velocities reach twice the band, the
 turns of friction further; measured by ``scripts/benchmark_population.py`` beside 3 and 12."""
 SMOOTHING_IN_EQUATIONS = 2.0
-"""Cut-off of the positions' smoothing over the equations': the spline's gain is 1.5 % off there, the average's a half."""
+"""Cut-off of the positions' smoothing over the equations': the spline is 1.5 % off there, the average half."""
 HIGHEST_SHARE_OF_RATE = 0.2
 """Of the equations' cut-off in the sampling rate: the smoothing's is then below half of it."""
 LOWEST_PERIODS = 4.0

@@ -161,7 +161,9 @@ def final_regressor(candidates: Candidates, settings: Settings, taken: Sequence[
     )
 
 
-def moments_of(regressor: Regressor, candidates: Candidates, taken: Sequence[tuple[Proposal, tuple[int, ...]]]) -> Moments:
+def moments_of(
+    regressor: Regressor, candidates: Candidates, taken: Sequence[tuple[Proposal, tuple[int, ...]]]
+) -> Moments:
     """The moments of a final regressor, read off those of all candidates."""
     columns = candidates.model([places for _, places in taken])
     by_name = {candidates.parameters[column].name.split(" #")[0]: int(column) for column in columns}

@@ -102,7 +102,7 @@ def choose_clock(
 
 def has_placeholder_inertias(robot: Robot) -> bool:
     """Whether most of a file's bodies are wider than the robot, or all the same: their inertia is no evidence."""
-    bodies = robot.inertial_parameters
+    bodies = robot.inertial_parameters.reshape(-1, 10)
     heavy = bodies[bodies[:, 0] > 0.0]
     if not len(heavy):
         return True
@@ -179,7 +179,8 @@ def clock_is_confirmed(robot: Robot, recording: Source) -> bool:
         return False
     product = square = 0.0
     for batch in recording.batches():
-        assert batch.time is not None and batch.velocity is not None
+        assert batch.time is not None
+        assert batch.velocity is not None
         if len(batch) > 1:
             rate = np.gradient(batch.position, batch.time, axis=0)
             product, square = product + float(np.sum(rate * batch.velocity)), square + float(np.sum(rate * rate))

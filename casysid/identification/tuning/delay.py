@@ -4,9 +4,9 @@ With the torque late by ``d``, ``tau(t + d) = Y(t) θ``. The delay enters nonlin
 out of one pass (:mod:`casysid.identification.tuning.delayed_moments`), and on them Gauss-Newton is one more column of
 the regression: minus the torque's slope, whose coefficient is the step.
 
-Friction, elasticity and filters also look late. So no delay, one for all joints, and one for each are hypotheses in the
-order of their simplicity (:mod:`casysid.identification.tuning.log_score`); and a delay that shifts the motion's quickest
-part by less than a hundredth of a period is none.
+Friction, elasticity and filters also look late. So no delay, one for all joints, and one for each are hypotheses in
+the order of their simplicity (:mod:`casysid.identification.tuning.log_score`); a delay that shifts the motion's
+quickest part by less than a hundredth of a period is none.
 """
 
 from __future__ import annotations

@@ -32,11 +32,11 @@ from casysid.projection import (
     LinearKnowledge,
     ProjectionProblem,
     build_projection,
-    constrained_least_squares,
+    convex_least_squares,
 )
 
 COSTLY = 1.05
-"""Gains are looked for when consistency, or gains fixed at one, raise the torque's error by so much: a practical gain."""
+"""Gains are looked for when consistency, or gains fixed at one, raise the torque's error by so much."""
 SMALLEST = 0.1
 """Gains that are all nearer to one than this are none: torque constants are known no better."""
 USUAL, PRICE = 0.3, 0.01
@@ -199,7 +199,7 @@ class _GainFit:
 
     def consistent(self, moments: Moments) -> Array:
         """Consistent parameters of least weighted residual energy."""
-        return constrained_least_squares(self._bodies, moments.pooled(self.weights), self.prior).parameters
+        return convex_least_squares(self._bodies, moments.pooled(self.weights), self.prior)
 
     def gains(self, moments: Moments, start: Array | None = None, steps: int = STEPS) -> tuple[Array, Array]:
         """Gains, from a start or ones, and the consistent parameters that go with them."""
@@ -230,16 +230,14 @@ class _GainFit:
         xx, xy, pull = normal.xx.copy(), normal.xy.copy(), PRICE * cost / USUAL**2
         xx[p:, p:] += pull * np.eye(dofs)
         xy[p:] -= pull * np.log(g)
-        found = constrained_least_squares(
+        found = convex_least_squares(
             self._with_gains, NormalEquations(xx, xy, normal.yy, normal.count), np.append(self.prior, np.zeros(dofs))
         )
-        return np.clip(found.parameters[p:], -LONGEST_STEP, LONGEST_STEP)
+        return np.clip(found[p:], -LONGEST_STEP, LONGEST_STEP)
 
     @cached_property
     def _bodies(self) -> ProjectionProblem:
-        return build_projection(
-            self.parameters, consistency=self.consistency, knowledge=self.knowledge
-        )
+        return build_projection(self.parameters, consistency=self.consistency, knowledge=self.knowledge)
 
     @cached_property
     def _with_gains(self) -> ProjectionProblem:

@@ -15,8 +15,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.arrays import Array, frozen
+
+Mask = npt.NDArray[np.bool_]
 
 EXPLAINED = 0.5
 """Share of a joint's torque energy that some hypothesis must explain on time left out for the joint to have a vote."""
@@ -51,13 +54,13 @@ class HeldOutScore:
         target = self.target.sum(axis=0)
         return np.asarray(1.0 - self.energy.sum(axis=0) / np.where(target > 0.0, target, np.inf))
 
-    def by_stretch(self, voting: Array) -> Array:
+    def by_stretch(self, voting: Mask) -> Array:
         """Mean logarithm of the likelihood of one equation in each stretch, joints weighted alike, shape (k,)."""
         rows = np.maximum(self.count[:, voting], 1.0)
         variance = np.maximum(self.variance[:, voting], np.finfo(np.float64).tiny)
         return np.asarray(-0.5 * np.mean(self.energy[:, voting] / (rows * variance) + np.log(variance), axis=1))
 
-    def size(self, voting: Array) -> float:
+    def size(self, voting: Mask) -> float:
         """Torque error, geometric mean over joints."""
         energy = np.maximum(self.energy[:, voting].sum(axis=0), np.finfo(np.float64).tiny)
         return float(np.exp(0.5 * np.mean(np.log(energy))))
