@@ -39,6 +39,8 @@ VARIANCE_FLOOR = 1e-10
 """Of ``σ²`` over the mean square of the target: perfect data end there."""
 CAREFUL_ROUNDS = 3
 """Rounds with the update of expectation-maximisation, which cannot overshoot from the start."""
+UNDECIDED = 1e-6
+"""Of fewer parameters than this a group's size is left as it is: it is divided by them, and both are rounding."""
 INFLATION_EVERY = 8
 """Rounds from one ``κ`` to the next: it changes little, and costs as much as several rounds."""
 STEADY = 2e-2
@@ -196,13 +198,14 @@ class EvidenceProblem:
         return min(max(len(g) - left, np.finfo(np.float64).eps), float(len(g)))
 
     def _sizes(self, delta: Array, C: Array, decided: Array, *, careful: bool) -> Array:
-        """MacKay's update; in the first rounds that of expectation-maximisation."""
+        """MacKay's update; that of expectation-maximisation in the first rounds, and where nothing is decided."""
         found = []
         for group, gamma in zip(self.groups, decided, strict=True):
             g = group.columns
             Q = self.precision[g[:, None], g]
             length = float(delta[g] @ Q @ delta[g])
-            found.append((length + float(np.sum(Q * C[g[:, None], g]))) / len(g) if careful else length / gamma)
+            open_still = (length + float(np.sum(Q * C[g[:, None], g]))) / len(g)
+            found.append(open_still if careful or gamma < UNDECIDED else length / gamma)
         return np.asarray(np.clip(np.array(found, dtype=np.float64), *SIZES))
 
     def _inflation(self, delta: Array, variance: Array) -> float:
