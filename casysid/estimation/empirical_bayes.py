@@ -16,7 +16,7 @@ from casysid.arrays import Array
 from casysid.errors import ParameterError
 from casysid.estimation.base import Estimate, Estimator, Feasible
 from casysid.estimation.covariance import covariance_from_blocks
-from casysid.estimation.evidence import build_evidence_problem, centre_of
+from casysid.estimation.evidence import build_evidence_problem, centre_of, seen_columns
 from casysid.estimation.standardise import check_prior
 from casysid.moments import Moments
 
@@ -64,6 +64,7 @@ class EmpiricalBayes(Estimator):
         )
         weights = 1.0 / fit.variance
         size = np.sqrt(fit.kappa / fit.size_by_column)
+        metric = problem.precision * np.outer(*2 * [np.where(seen_columns(moments), size, 0.0)])
         spread = None
         if self.standard_errors:
             K = problem.covariance / np.outer(size, size)
@@ -73,7 +74,7 @@ class EmpiricalBayes(Estimator):
             parameters=centre + fit.mean,
             covariance=fit.covariance if spread is None else spread.marked,
             spread=spread,
-            metric=moments.pooled(weights).xx + problem.precision * np.outer(size, size),
+            metric=moments.pooled(weights).xx + metric,
             noise_std=np.sqrt(fit.variance),
             rank=round(sum(fit.decided.values())),
             status=fit.status,

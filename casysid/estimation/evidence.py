@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.arrays import Array
 from casysid.estimation.base import Feasible, Status
@@ -69,15 +70,22 @@ def groups_of(columns: Sequence[str]) -> tuple[Group, ...]:
     return (*found, *(Group(kind, np.array(places)) for kind, places in kinds.items()))
 
 
+def seen_columns(moments: Moments) -> npt.NDArray[np.bool_]:
+    """Which columns have any energy, shape (p,); all of a link's do if one has."""
+    seen = np.zeros(len(moments.columns), dtype=bool)
+    for own, sums in zip(moments.row_columns, moments.squares, strict=True):
+        seen[own] |= np.einsum("bmm->m", sums)[:-1] > 0.0
+    for link in links_among(moments.columns):
+        seen[link] = seen[link].any()
+    return seen
+
+
 def centre_of(moments: Moments, prior: Array) -> Array:
     """About what parameters scatter, shape (p,): the prior for links, zero for drives, whose file values mean little.
 
     Columns that the data do not see keep the prior's value.
     """
-    seen = np.zeros(len(prior), dtype=bool)
-    for own, sums in zip(moments.row_columns, moments.squares, strict=True):
-        seen[own] |= np.einsum("bmm->m", sums)[:-1] > 0.0
-    centre = prior.copy()
+    seen, centre = seen_columns(moments), prior.copy()
     for group in groups_of(moments.columns):
         if group.name not in (LINKS, UNOWNED):
             centre[group.columns] = np.where(seen[group.columns], 0.0, prior[group.columns])
