@@ -31,6 +31,8 @@ from casysid.projection import LinearKnowledge, build_projection, possible_param
 
 MOST = 30
 """Kinds that may join: more than any robot's drives have."""
+CLEARLY_BROKEN = 2.0
+"""Standard errors by which a law of other columns must be missed to keep a candidate out: the fit to come holds it."""
 AT_ZERO = 1e-7
 """A coefficient below this share of the largest is zero to the convex solver."""
 
@@ -131,7 +133,7 @@ class _Search:
                 return False
             proposal, columns = left[place]
             score = held_out.score(columns)
-            if self._is_better(proposal, without, score) and self._is_lawful(held_out, columns):
+            if self._is_better(proposal, without, score) and self._is_lawful(held_out, columns, noise):
                 self.taken.append((proposal, columns))
                 self.chosen.append(self._described(proposal, without, score, float(gains[place])))
                 return True
@@ -163,11 +165,16 @@ class _Search:
         no_worse = (score.energy @ self._weights).sum() < (without.energy @ self._weights).sum()
         return bool((after < before).all() and clear and no_worse)
 
-    def _is_lawful(self, held_out: HeldOut, columns: Columns) -> bool:
-        """Whether the fit to all data keeps the candidate's laws, and any other that the fit without it keeps."""
-        before, after = (self._centre + held_out.fit(own) for own in ((), columns))
+    def _is_lawful(self, held_out: HeldOut, columns: Columns, noise: float) -> bool:
+        """Whether the fit to all data keeps the candidate's laws, and hardly breaks any that the fit without it keeps.
+
+        Coefficients of friction that is not there are zero but for their noise, and change sign with any candidate.
+        """
+        before, after = (self._laws @ (self._centre + held_out.fit(own)) for own in ((), columns))
+        C = held_out.covariance(columns, noise)
+        error = np.sqrt(np.maximum(np.einsum("rm,mn,rn->r", self._laws, C, self._laws, optimize=True), 0.0))
         own = (self._laws[:, list(columns)] != 0.0).any(axis=1)
-        kept = (self._laws @ after >= 0.0) | ((self._laws @ before < 0.0) & ~own)
+        kept = (after >= 0.0) | (~own & ((before < 0.0) | (after >= -CLEARLY_BROKEN * error)))
         return bool(kept.all())
 
     def _described(

@@ -50,7 +50,7 @@ class HeldOut:
         parts = list(self._stretches.by_block(weights))
         total: Array = np.sum(parts, axis=0)
         self._pull = pull + LEAST_PULL * np.diag(np.diag(total)[model])
-        self._energy = np.diag(total)
+        self._square, self._energy = total, np.diag(total)
         counts = self._stretches.count.sum(axis=1)
         self._factors = counts.sum() / np.maximum(counts.sum() - counts, 1.0)
         self._fits = [
@@ -82,6 +82,21 @@ class HeldOut:
     def fit(self, columns: Sequence[int] = ()) -> Array:
         """Parameters from all data with some more columns in the model, shape (p,)."""
         return self._solve(self._whole, columns)
+
+    def covariance(self, columns: Sequence[int], noise: float) -> Array:
+        """Of the parameters of :meth:`fit`, zero for those that are not in it, shape (p, p).
+
+        Args:
+            columns: That join the model.
+            noise: Variance of the weighted rows, ``κ``.
+        """
+        own = np.array([*self._model, *columns])
+        precision = self._square[own[:, None], own] + LEAST_PULL * np.diag(self._energy[own])
+        precision[: len(self._model), : len(self._model)] += self._pull
+        size = np.sqrt(np.maximum(np.diag(precision), np.finfo(np.float64).tiny))
+        covariance = np.zeros((len(self._energy) - 1,) * 2)
+        covariance[own[:, None], own] = noise * np.linalg.pinv(precision / np.outer(size, size)) / np.outer(size, size)
+        return covariance
 
     def gain(self, columns: Sequence[int], noise: float) -> float:
         """Evidence for some columns to join: ``½ (q - d - d ln(q / d))``, zero where ``q <= d``.

@@ -23,10 +23,13 @@ from casysid.dynamics import (
 )
 from casysid.errors import ParameterError
 from casysid.identification import Settings, identify
-from casysid.identification.friction_choice import choose_friction
 from casysid.identification.friction_laws import broken_laws, friction_laws
 from casysid.identification.friction_model import model_from_json, model_to_json
 from casysid.identification.output import write_result
+from casysid.identification.passes import Passes
+from casysid.identification.tuning.band import choose_band
+from casysid.identification.tuning.candidates import gather_candidates
+from casysid.identification.tuning.friction_selection import select_friction
 from casysid.inertia import Consistency
 from casysid.recording import Recording
 from casysid.report import render_report
@@ -78,29 +81,37 @@ def recording(kind=None, seed=0, share=0.15, duration=20.0):
 LOADED = recording("loaded_coulomb", share=0.4, duration=30.0).split(0.6)
 
 
+def chosen(recording, settings=SETTINGS):
+    """What joins, and the candidates that it was chosen from."""
+    passes = Passes(bundled_robot("two_link"), [recording], choose_band([recording], settings.cutoff), threads=1)
+    candidates = gather_candidates(passes, settings)
+    return select_friction(candidates, settings), candidates
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_kind_that_is_there_is_found(kind):
-    choice = choose_friction(bundled_robot("two_link"), [recording(kind)], CUTOFF, SETTINGS, 5e-3)
+    choice, _ = chosen(recording(kind))
     assert kind in [one.kind for one in choice.chosen], choice.chosen
     assert all("shoulder" in one.joints for one in choice.chosen)
+    assert all(one.error_after < one.error_before for one in choice.chosen)
+    assert len({proposal.name for proposal, _ in choice.taken}) == len(choice.taken)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_plain_friction_stays_plain(seed):
-    choice = choose_friction(bundled_robot("two_link"), [recording(seed=seed)], CUTOFF, SETTINGS, 5e-3)
+    choice, candidates = chosen(recording(seed=seed))
     assert choice.chosen == ()
     assert choice.asked > 20
-    assert choice.settings == dataclasses.replace(SETTINGS, choose_friction=False)
+    usual = {"friction": candidates.base.friction, "choose_friction": False}
+    assert choice.settings == dataclasses.replace(SETTINGS, **usual)
 
 
 def test_nothing_is_chosen_through_heavy_noise_of_the_positions():
     clean = recording("loaded_coulomb")
-    for noise, asked in ((1e-6, True), (1e-2, False)):
+    for noise, found in ((1e-6, True), (1e-2, False)):
         position = clean.position + noise * np.random.default_rng(0).normal(size=clean.position.shape)
-        noisy = dataclasses.replace(clean, position=position)
-        choice = choose_friction(bundled_robot("two_link"), [noisy], CUTOFF, SETTINGS, 5e-3)
-        assert (choice.asked > 0) == asked
-        assert not choice.settings.choose_friction
+        choice, _ = chosen(dataclasses.replace(clean, position=position))
+        assert bool(choice.chosen) == found
 
 
 def test_nothing_that_was_declared_is_proposed_again():
@@ -109,8 +120,21 @@ def test_nothing_that_was_declared_is_proposed_again():
         friction=(*DEFAULT_FRICTION, Stribeck(velocity=0.2)),
         couplings=(Coupling(("shoulder", "elbow"), (1.0, 1.0)),),
     )
-    choice = choose_friction(bundled_robot("two_link"), [recording("coupling")], CUTOFF, known, 5e-3)
+    choice, _ = chosen(recording("coupling"), known)
     assert not {"stribeck", "coupling"} & {one.kind for one in choice.chosen}
+
+
+def test_a_sign_that_physics_forbids_keeps_a_kind_out():
+    choice, _ = chosen(recording("loaded_coulomb", share=-0.4))
+    assert "loaded_coulomb" not in [one.kind for one in choice.chosen]
+
+
+def test_what_helps_in_one_stretch_alone_stays_out():
+    plain, sprung = recording(), recording("stiffness", share=0.6)
+    torque = np.array(plain.torque)
+    torque[1600:2000] += (sprung.torque - plain.torque)[1600:2000]
+    choice, _ = chosen(dataclasses.replace(plain, torque=torque))
+    assert "stiffness" not in [one.kind for one in choice.chosen]
 
 
 @pytest.fixture(scope="module")
