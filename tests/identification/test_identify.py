@@ -15,7 +15,7 @@ from casysid.identification.verdict import judge
 from casysid.inertia import Consistency
 from casysid.recording import Recording
 from casysid.robot import Robot
-from casysid.signals import build_smoother
+from casysid.signals import BandAverage
 from casysid.simulation import IDEAL, NO_MECHANICS, Plant, PlantSettings
 from tests.simulated import bundled_robot, simulated_run
 
@@ -49,14 +49,19 @@ def test_held_out_torque_is_predicted_on_a_robot_with_all_effects(result):
 
 
 def test_errors_are_what_they_say(result):
-    motion, cutoff = result.held_out_motions[0], result.cutoff.cutoff
-    predicted = result.regressor.predict(result.parameters, motion.q, motion.v, motion.a)
-    seen = build_smoother(motion.time, cutoff)
-    residual, measured = seen.smooth(motion.tau - predicted), seen.smooth(motion.tau)
+    """Measured and predicted torque averaged by the same windows, away from the ends."""
+    motion, cutoff = result.held_out_motions[0], result.cutoff.errors
+    predicted = result.regressor.predict(result.parameters, motion.q, motion.v, motion.a, time=motion.time)
+    inner = np.flatnonzero(motion.settled)
+    assert 0 < len(inner) < len(motion)
+    average = BandAverage(motion.time, cutoff).weights(inner)
+    residual, measured = average @ (motion.tau - predicted), average @ motion.tau
     error = np.linalg.norm(residual) / np.linalg.norm(measured)
     assert result.held_out.relative == pytest.approx(error, rel=1e-9)
     assert result.held_out.rmse == pytest.approx(np.sqrt(np.mean(residual**2, axis=0)), rel=1e-9)
-    unfiltered = np.linalg.norm(motion.tau - predicted) / np.linalg.norm(motion.tau)
+    by_joint = np.linalg.norm(residual, axis=0) / np.linalg.norm(measured, axis=0)
+    assert result.held_out.relative_by_joint == pytest.approx(by_joint, rel=1e-9)
+    unfiltered = np.linalg.norm((motion.tau - predicted)[inner]) / np.linalg.norm(motion.tau[inner])
     assert result.held_out.relative_unfiltered == pytest.approx(unfiltered, rel=1e-9)
 
 
