@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from casysid.dynamics import build_regressor
 from casysid.errors import CasysidWarning
-from casysid.identification import MistakeKind, Settings, find_mistakes, identify
+from casysid.identification import MistakeKind, Settings, choose_band, find_mistakes, identify
+from casysid.identification.passes import Passes
 from casysid.recording import Recording, read_recording
 from casysid.robot import Robot
 from casysid.simulation import design_sinusoids
@@ -44,6 +45,12 @@ def clean_log(name, seed=0):
         position=reference.channels + 1e-4 * rng.normal(size=reference.channels.shape),
         torque=tau + 0.03 * tau.std(axis=0) * rng.normal(size=tau.shape),
     )
+
+
+def search(robot, recording):
+    """Mistakes in a recording that is read as the identification reads it."""
+    passes = Passes(robot, [recording], choose_band([recording]))
+    return find_mistakes(robot, passes.sparse_motions, passes.band.cutoff)
 
 
 def with_wrong_masses(robot, seed):
@@ -106,7 +113,7 @@ MISTAKES = [
 @pytest.mark.parametrize(("kind", "changes", "joints"), MISTAKES)
 def test_one_mistake_is_named_with_its_joints_though_the_file_is_wrong(name, kind, changes, joints):
     robot = bundled_robot(name)
-    mistakes = find_mistakes(with_wrong_masses(robot, 1), [changed(clean_log(name), **changes)])
+    mistakes = search(with_wrong_masses(robot, 1), changed(clean_log(name), **changes))
     assert [mistake.kind for mistake in mistakes] == [kind]
     mistake = mistakes[0]
     wanted = robot.dofs if joints is None else tuple(robot.dofs[k] for k in sorted(joints))
@@ -119,12 +126,12 @@ def test_one_mistake_is_named_with_its_joints_though_the_file_is_wrong(name, kin
 @settings(max_examples=15, deadline=None)
 @given(st.sampled_from(["two_link.urdf", "scara.urdf", "head.urdf"]), st.integers(0, 2**32 - 1), st.integers(0, 2))
 def test_a_file_whose_masses_are_wrong_accuses_nobody(name, seed, log):
-    assert find_mistakes(with_wrong_masses(bundled_robot(name), seed), [clean_log(name, log)]) == ()
+    assert search(with_wrong_masses(bundled_robot(name), seed), clean_log(name, log)) == ()
 
 
 def test_two_mistakes_are_found_one_after_the_other():
     robot, log = bundled_robot("head.urdf"), clean_log("head.urdf")
-    mistakes = find_mistakes(robot, [changed(log, tau=lambda tau: [negate(1)(tau), negate(2)(tau)])])
+    mistakes = search(robot, changed(log, tau=lambda tau: [negate(1)(tau), negate(2)(tau)]))
     assert {(one.kind, one.joints) for one in mistakes} == {
         (MistakeKind.TORQUE_NEGATED, (robot.dofs[1],)),
         (MistakeKind.TORQUE_NEGATED, (robot.dofs[2],)),
@@ -138,7 +145,7 @@ def test_samples_without_time_are_searched_as_well():
     regressor = build_regressor(robot)
     tau = regressor.predict(regressor.prior, q, v, a) * [1, -1]
     log = Recording(channels=robot.channels, dofs=robot.dofs, position=q, velocity=v, acceleration=a, torque=tau)
-    (mistake,) = find_mistakes(robot, [log])
+    (mistake,) = search(robot, log)
     assert mistake.words == f"tau of {robot.dofs[1]} looks negated"
 
 
@@ -161,7 +168,7 @@ def test_identify_warns_and_changes_nothing():
 )
 def test_a_turned_sign_is_mended_by_what_the_warning_says(changes, flip):
     robot, clean = bundled_robot("two_link.urdf"), clean_log("two_link.urdf")
-    (mistake,) = find_mistakes(robot, [changed(clean, **changes)])
+    (mistake,) = search(robot, changed(clean, **changes))
     assert mistake.flip == flip
     assert mistake.sentence.endswith(f"by --flip {flip}")
     settings = Settings(cutoff=6.0, delay=0.0, flip=(flip,))
@@ -180,4 +187,4 @@ def test_a_turned_sign_is_mended_by_what_the_warning_says(changes, flip):
 def test_real_logs_are_not_accused(folder):
     urdf, log = LOGS[folder]
     robot = Robot.from_file(REAL / folder / urdf)
-    assert find_mistakes(robot, [read_recording(REAL / folder / f"{log}.csv.gz", robot)]) == ()
+    assert search(robot, read_recording(REAL / folder / f"{log}.csv.gz", robot)) == ()
