@@ -14,7 +14,7 @@ one, a ratio is a win. A failure counts as a ratio of ten. Coverage looks at log
 errors.
 
 ``--frictionless`` instead takes robots without friction or rotors, 10 s of Fourier motion at 100 Hz with 1 and 5 %
-torque noise; the told rival then has rigid bodies alone.
+torque noise; the told rival then has rigid bodies alone. Ctrl-C shows what there is until then.
 """
 
 from __future__ import annotations
@@ -25,11 +25,12 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded: process
 
 import argparse
 import json
-from concurrent.futures import ProcessPoolExecutor
-from functools import partial
+import math
+import signal
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-from population.scoring import judge, judge_frictionless
+from population.scoring import judge
 from population.table import coverage, discoveries, groups, show, show_frictionless, summary, what
 from rich.console import Console
 from rich.progress import track
@@ -71,31 +72,48 @@ def write(path: Path, records: list[dict], frictionless: bool) -> None:
         "records": records,
     }
     part = path.with_name(path.name + ".part")
-    part.write_text(json.dumps(content, indent=1) + "\n")
+    part.write_text(json.dumps(without_nan(content), indent=1, allow_nan=False) + "\n")
     os.replace(part, path)
+
+
+def without_nan(value: object) -> object:
+    """Nested content with NaN and infinities as None, which JSON can hold."""
+    if isinstance(value, dict):
+        return {key: without_nan(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [without_nan(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=seeds_of, default=seeds_of("0-99"), help="A-B, both included")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
-    parser.add_argument("--json", type=Path, help="one record a seed, and the figures of the tables")
+    parser.add_argument(
+        "--json", type=Path, help="one record a seed, and the figures of the tables; kept up to date all along"
+    )
     parser.add_argument("--verbose", action="store_true", help="every seed's record as it comes in")
     parser.add_argument("--frictionless", action="store_true", help="robots without friction instead")
     options = parser.parse_args()
     console, progress = Console(width=200), Console(stderr=True)
-    works = [partial(judge_frictionless, noise=noise) for noise in NOISES] if options.frictionless else [judge]
-    records = []
-    with ProcessPoolExecutor(options.jobs) as pool:
-        for work in works:
-            runs = pool.map(work, options.seeds)
-            for record in track(runs, "seeds", len(options.seeds), console=progress):
-                records.append(record)
+    noises = NOISES if options.frictionless else (None,)
+    records: list[dict] = []
+    with ProcessPoolExecutor(options.jobs, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)) as pool:
+        runs = [pool.submit(judge, seed, noise) for noise in noises for seed in options.seeds]
+        try:
+            for run in track(as_completed(runs), "seeds", len(runs), console=progress):
+                records = sorted(
+                    [*records, run.result()], key=lambda record: (record.get("noise", 0.0), record["seed"])
+                )
                 if options.verbose:
-                    tell(console, record)
-    (show_frictionless if options.frictionless else show)(records, console)
-    if options.json:
-        write(options.json, records, options.frictionless)
+                    tell(console, run.result())
+                if options.json:
+                    write(options.json, records, options.frictionless)
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+            progress.print(f"interrupted: {len(records)} of {len(runs)} experiments")
+    if records:
+        (show_frictionless if options.frictionless else show)(records, console)
 
 
 if __name__ == "__main__":

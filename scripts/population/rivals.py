@@ -5,7 +5,10 @@ residuals, and take the pseudo-inverse. The one that is told has the true fricti
 numbers (widths, Stribeck velocities, yield distances, harmonics, loads), the clock, delays, gains and signs. The other
 has viscous, ``tanh`` Coulomb, offset and armature on every joint, and takes the log as it is.
 
-Neither sees the model file. No honest method knows the best cut-off.
+A third is told as well and puts the regressor through the same low-pass as the torque, which keeps sharp friction
+consistent between the two (Gautier's parallel filter); it is usually the strongest.
+
+None sees the model file. No honest method knows the best cut-off.
 """
 
 from __future__ import annotations
@@ -23,8 +26,8 @@ from population.sensors import no_faults
 
 CUTOFFS = 1.5 * 2.0 ** np.arange(6)
 """In the frequencies below which 99 % of the true velocities' energy lies, the joint with the highest counting."""
-HIGHEST_SHARE = 0.4
-"""Of the sampling rate."""
+HIGHEST_SHARE, SMOOTHER = 0.4, 2.0
+"""Of the sampling rate; the motion's cut-off over the torque's where the regressor is filtered."""
 OVERSAMPLING, LEAST_ROWS, MOST_ROWS = 6.0, 1500, 6000
 """Rows are thinned to so many times the cut-off, and to these numbers."""
 WIDTH_SHARE = 0.01
@@ -64,13 +67,18 @@ class Log:
     torque: np.ndarray
     distance: np.ndarray
 
-    def smoothed(self, cutoff: float) -> tuple[State, np.ndarray, np.ndarray]:
-        """Motion, torque, and which of the samples are far from gaps and ends."""
+    def motion(self, cutoff: float) -> State:
+        """Smoothed below a frequency [Hz], and differentiated."""
         q = low_pass(self.position, cutoff, self.rate)
         v = np.gradient(q, 1.0 / self.rate, axis=0)
-        a = low_pass(np.gradient(v, 1.0 / self.rate, axis=0), cutoff, self.rate)
-        margin = min(1.0 / cutoff, MOST_TRIMMED * len(q) / self.rate)
-        return State(q, v, a), low_pass(self.torque, cutoff, self.rate), self.distance >= margin
+        return State(q, v, low_pass(np.gradient(v, 1.0 / self.rate, axis=0), cutoff, self.rate))
+
+    def rows(self, cutoff: float) -> np.ndarray:
+        """Samples far from gaps and ends, thinned to what a band [Hz] needs."""
+        margin = min(1.0 / cutoff, MOST_TRIMMED * len(self.position) / self.rate)
+        whole = np.flatnonzero(self.distance >= margin)
+        wanted = np.clip(OVERSAMPLING * cutoff * len(whole) / self.rate, LEAST_ROWS, MOST_ROWS)
+        return whole[:: max(int(len(whole) / wanted), 1)]
 
 
 def low_pass(x: np.ndarray, cutoff: float, rate: float) -> np.ndarray:
@@ -124,20 +132,27 @@ def solve(A: np.ndarray, b: np.ndarray) -> np.ndarray:
     return x / size
 
 
-def best_fit(experiment: Experiment, *, told: bool) -> Fit:
-    """The best of six cut-offs, with the result in view."""
+def best_fit(experiment: Experiment, *, told: bool, filtered: bool = False) -> Fit:
+    """The best of six cut-offs, with the result in view.
+
+    Args:
+        experiment: Its log is fitted.
+        told: Whether the rival knows the truth's columns and the log's faults.
+        filtered: Whether the regressor goes through the torque's low-pass, its motion being smoothed at twice that.
+    """
     log, bodies = read_log(experiment, told), experiment.truth.bodies
     scale = experiment.faults.scale if told else np.ones(experiment.mechanism.robot.nv)
-    band = velocity_band(experiment)
     highest = HIGHEST_SHARE * log.rate
     found = []
-    for cutoff in np.unique(np.minimum(CUTOFFS * band, highest)):
-        state, torque, whole = log.smoothed(float(cutoff))
+    for cutoff in np.unique(np.minimum(CUTOFFS * velocity_band(experiment), highest)):
+        state = log.motion(min(SMOOTHER * cutoff, highest) if filtered else cutoff)
         terms = experiment.truth.terms if told else ordinary_terms(state)
-        rows = np.flatnonzero(whole)
-        wanted = np.clip(OVERSAMPLING * cutoff * len(rows) / log.rate, LEAST_ROWS, MOST_ROWS)
-        rows = rows[:: max(int(len(rows) / wanted), 1)]
-        x = solve(regressor(bodies, terms, state, rows), torque[rows])
+        rows = log.rows(cutoff)
+        if filtered:
+            A = low_pass(regressor(bodies, terms, state), cutoff, log.rate)[rows]
+        else:
+            A = regressor(bodies, terms, state, rows)
+        x = solve(A, low_pass(log.torque, cutoff, log.rate)[rows])
         predicted = regressor(bodies, terms, experiment.fresh) @ x * scale
         found.append(Fit(relative_error(predicted, experiment.fresh_torque), float(cutoff)))
     return min(found, key=lambda fit: fit.error)

@@ -18,24 +18,28 @@ FINDABLE = 0.05
 CLOCK_TOLERANCE, DELAY_TOLERANCE, GAIN_TOLERANCE = 0.1, 0.3, 0.1
 """How near to the truth a fault is found: relative, relative (or half a period), relative between joints."""
 MESSAGE = 300
+RIVALS = {"told": (True, False), "told_filtered": (True, True), "untold": (False, False)}
+"""Whether each is told, and whether it filters the regressor."""
 
 
-def judge(seed: int) -> dict[str, Any]:
-    """The record of one seed; what goes wrong in casysid is in it under ``failure``."""
-    return judged(draw_experiment(seed))
+def judge(seed: int, noise: float | None = None) -> dict[str, Any]:
+    """The record of one seed; what goes wrong in casysid is in it under ``failure``.
 
-
-def judge_frictionless(seed: int, noise: float) -> dict[str, Any]:
-    """The record of a robot without friction, under torque noise of a share of the torque's rms."""
+    Args:
+        seed: Of the experiment.
+        noise: Of a robot without friction, as a share of the torque's rms; None for any experiment.
+    """
+    if noise is None:
+        return judged(draw_experiment(seed))
     return judged(draw_frictionless(seed, noise)) | {"noise": noise}
 
 
 def judged(experiment: Experiment) -> dict[str, Any]:
     """See :func:`judge`."""
-    told, untold = (best_fit(experiment, told=knows) for knows in (True, False))
     record = description(experiment)
-    record["told"], record["untold"] = told.error, untold.error
-    record["told_cutoff"], record["untold_cutoff"] = told.cutoff, untold.cutoff
+    for rival, (told, filtered) in RIVALS.items():
+        fit = best_fit(experiment, told=told, filtered=filtered)
+        record |= {rival: fit.error, f"{rival}_cutoff": fit.cutoff}
     began = time.process_time()
     try:
         answer = ask(experiment.file, experiment.recording)

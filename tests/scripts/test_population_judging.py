@@ -87,6 +87,7 @@ def test_the_rival_that_knows_everything_is_nearly_exact_without_noise_and_bette
     experiments, rivals = load("population.experiments"), load("population.rivals")
     quiet = experiments.draw_frictionless(1, 0.0)
     assert rivals.best_fit(quiet, told=True).error < 2e-3
+    assert rivals.best_fit(quiet, told=True, filtered=True).error < 2e-3
     drawn = experiments.draw_experiment(3)
     assert rivals.best_fit(drawn, told=True).error < 0.3 * rivals.best_fit(drawn, told=False).error
 
@@ -176,7 +177,7 @@ def record(seed: int, error: float | None, **other: object) -> dict:
     blank = {
         "seed": seed, "joints": 2, "motion": "chirp", "rests": False, "friction": "ordinary", "effects": [],
         "file": "units", "faults": [], "sampling": [], "rate": 100.0, "duration": 9.0, "contained": True,
-        "told": 0.1, "untold": 0.2, "seconds": 1.0,
+        "told": 0.1, "told_filtered": 0.05, "untold": 0.2, "seconds": 1.0,
     }  # fmt: skip
     return blank | ({"failure": "KeyError: 'x'"} if error is None else {"error": error}) | other
 
