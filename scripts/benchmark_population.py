@@ -1,6 +1,7 @@
 """casysid with defaults on random experiments with known truth, against least squares that is told the truth's columns.
 
-    python scripts/benchmark_population.py [--seeds 0-99] [--jobs 2] [--json FILE] [--verbose] [--frictionless]
+    python scripts/benchmark_population.py [--seeds 0-99] [--jobs 2] [--json FILE] [--rivals FILE] [--verbose]
+        [--frictionless]
     python scripts/benchmark_population.py --seeds 17-17 --verbose
 
 Seeds 0-299 are for development; 1000-1999 are for reporting, and nothing is to be chosen by them. A seed is one
@@ -92,14 +93,19 @@ def main() -> None:
     parser.add_argument(
         "--json", type=Path, help="one record a seed, and the figures of the tables; kept up to date all along"
     )
+    parser.add_argument("--rivals", type=Path, help="an earlier JSON: rivals of the same experiments are not run again")
     parser.add_argument("--verbose", action="store_true", help="every seed's record as it comes in")
     parser.add_argument("--frictionless", action="store_true", help="robots without friction instead")
     options = parser.parse_args()
     console, progress = Console(width=200), Console(stderr=True)
     noises = NOISES if options.frictionless else (None,)
+    known = json.loads(options.rivals.read_text())["records"] if options.rivals else []
+    earlier = {(record["seed"], record.get("noise")): record for record in known}
     records: list[dict] = []
     with ProcessPoolExecutor(options.jobs, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)) as pool:
-        runs = [pool.submit(judge, seed, noise) for noise in noises for seed in options.seeds]
+        runs = [
+            pool.submit(judge, seed, noise, earlier.get((seed, noise))) for noise in noises for seed in options.seeds
+        ]
         try:
             for run in track(as_completed(runs), "seeds", len(runs), console=progress):
                 records = sorted(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
+import zlib
 from typing import Any
 
 import numpy as np
@@ -20,29 +21,46 @@ CLOCK_TOLERANCE, DELAY_TOLERANCE, GAIN_TOLERANCE = 0.1, 0.3, 0.1
 MESSAGE = 300
 RIVALS = {"told": (True, False), "told_filtered": (True, True), "untold": (False, False)}
 """Whether each is told, and whether it filters the regressor."""
+RIVAL_KEYS = tuple(key for rival in RIVALS for key in (rival, f"{rival}_cutoff"))
 
 
-def judge(seed: int, noise: float | None = None) -> dict[str, Any]:
+def judge(seed: int, noise: float | None = None, earlier: dict[str, Any] | None = None) -> dict[str, Any]:
     """The record of one seed; what goes wrong in casysid is in it under ``failure``.
 
     Args:
         seed: Of the experiment.
         noise: Of a robot without friction, as a share of the torque's rms; None for any experiment.
+        earlier: Record of the same seed, from which the rivals' errors are taken if the experiment is still the same.
     """
     if noise is None:
-        return judged(draw_experiment(seed))
-    return judged(draw_frictionless(seed, noise)) | {"noise": noise}
+        return judged(draw_experiment(seed), earlier)
+    return judged(draw_frictionless(seed, noise), earlier) | {"noise": noise}
 
 
-def judged(experiment: Experiment) -> dict[str, Any]:
-    """See :func:`judge`."""
-    record = description(experiment)
+def fingerprint(experiment: Experiment) -> int:
+    """Of the log and of what is judged, to nine digits, so that rounding on other machines does not count."""
+    arrays = (experiment.recording.position, experiment.recording.torque, experiment.fresh_torque)
+    return zlib.crc32(",".join(f"{np.linalg.norm(array):.9e}" for array in arrays).encode())
+
+
+def rivals(experiment: Experiment) -> dict[str, float]:
+    """Errors of all rivals, and their cut-offs."""
+    found = {}
     for rival, (told, filtered) in RIVALS.items():
         fit = best_fit(experiment, told=told, filtered=filtered)
-        record |= {rival: fit.error, f"{rival}_cutoff": fit.cutoff}
+        found |= {rival: fit.error, f"{rival}_cutoff": fit.cutoff}
+    return found
+
+
+def judged(experiment: Experiment, earlier: dict[str, Any] | None = None) -> dict[str, Any]:
+    """See :func:`judge`."""
+    record = description(experiment)
+    same = earlier is not None and earlier["fingerprint"] == record["fingerprint"]
+    record |= {key: earlier[key] for key in RIVAL_KEYS} if earlier is not None and same else rivals(experiment)
     began = time.process_time()
     try:
         answer = ask(experiment.file, experiment.recording)
+        record["seconds"] = answer.seconds
         record["error"] = relative_error(answer.torque(*experiment.fresh), experiment.fresh_torque)
         record["found"] = discoveries(experiment, answer)
         record["coverage"] = {} if experiment.faults.names else intervals(experiment, answer)
@@ -50,7 +68,7 @@ def judged(experiment: Experiment) -> dict[str, Any]:
         record["failure"] = f"{type(failure).__name__}: {str(failure)[:MESSAGE]}"
         record["traceback"] = traceback.format_exc()
         record.pop("error", None)
-    record["seconds"] = time.process_time() - began
+    record.setdefault("seconds", time.process_time() - began)
     return record
 
 
@@ -60,6 +78,7 @@ def description(experiment: Experiment) -> dict[str, Any]:
     effects = truth.effects
     return {
         "seed": experiment.seed,
+        "fingerprint": fingerprint(experiment),
         "joints": experiment.mechanism.robot.nv,
         "shape": experiment.mechanism.shape,
         "motion": experiment.family.kind,

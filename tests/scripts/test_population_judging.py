@@ -172,6 +172,22 @@ def test_a_real_answer_predicts_the_fresh_motion(load) -> None:
     assert 0.5 * counts["base"][1] < counts["base"][0] <= counts["base"][1]
 
 
+def test_rivals_are_taken_from_an_earlier_record_of_the_same_experiment_only(load, monkeypatch) -> None:
+    scoring, drawn = load("population.scoring"), load("population.experiments").draw_frictionless(1, 0.01)
+    other = load("population.experiments").draw_frictionless(1, 0.02)
+
+    def fail(*_: object) -> None:
+        raise KeyError("no answer")
+
+    monkeypatch.setattr(scoring, "ask", fail)
+    first = scoring.judged(drawn)
+    assert first["failure"] == "KeyError: 'no answer'"
+    assert "error" not in first
+    changed = first | {"told": 123.0}
+    assert scoring.judged(drawn, changed)["told"] == 123.0
+    assert scoring.judged(other, changed)["told"] < 1.0
+
+
 def record(seed: int, error: float | None, **other: object) -> dict:
     """A record as judging makes it."""
     blank = {
