@@ -3,6 +3,7 @@
     python scripts/benchmark_population.py [--seeds 0-99] [--jobs 2] [--json FILE] [--rivals FILE] [--verbose]
         [--frictionless]
     python scripts/benchmark_population.py --seeds 17-17 --verbose
+    python scripts/benchmark_population.py --show FILE
 
 Seeds 0-299 are for development; 1000-1999 are for reporting, and nothing is to be chosen by them. A seed is one
 experiment: a random mechanism, its friction, a log and a model file that is wrong. The distributions stand in the texts
@@ -86,6 +87,33 @@ def without_nan(value: object) -> object:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def saved(path: Path | None) -> list[dict]:
+    """Records that an earlier run wrote."""
+    return json.loads(path.read_text())["records"] if path else []
+
+
+def run(options: argparse.Namespace) -> list[dict]:
+    """Records by noise and seed; those there are until Ctrl-C."""
+    progress, records = Console(stderr=True), []
+    noises = NOISES if options.frictionless else (None,)
+    earlier = {(record["seed"], record.get("noise")): record for record in saved(options.rivals)}
+    works = [(seed, noise, earlier.get((seed, noise))) for noise in noises for seed in options.seeds]
+    with ProcessPoolExecutor(options.jobs, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)) as pool:
+        runs = [pool.submit(judge, *work) for work in works]
+        try:
+            for one in track(as_completed(runs), "seeds", len(runs), console=progress):
+                records.append(one.result())
+                records.sort(key=lambda record: (record.get("noise", 0.0), record["seed"]))
+                if options.verbose:
+                    tell(Console(width=200), one.result())
+                if options.json:
+                    write(options.json, records, options.frictionless)
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+            progress.print(f"interrupted: {len(records)} of {len(runs)} experiments")
+    return records
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=seeds_of, default=seeds_of("0-99"), help="A-B, both included")
@@ -94,32 +122,13 @@ def main() -> None:
         "--json", type=Path, help="one record a seed, and the figures of the tables; kept up to date all along"
     )
     parser.add_argument("--rivals", type=Path, help="an earlier JSON: rivals of the same experiments are not run again")
+    parser.add_argument("--show", type=Path, help="an earlier JSON: its tables, nothing is run")
     parser.add_argument("--verbose", action="store_true", help="every seed's record as it comes in")
     parser.add_argument("--frictionless", action="store_true", help="robots without friction instead")
     options = parser.parse_args()
-    console, progress = Console(width=200), Console(stderr=True)
-    noises = NOISES if options.frictionless else (None,)
-    known = json.loads(options.rivals.read_text())["records"] if options.rivals else []
-    earlier = {(record["seed"], record.get("noise")): record for record in known}
-    records: list[dict] = []
-    with ProcessPoolExecutor(options.jobs, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)) as pool:
-        runs = [
-            pool.submit(judge, seed, noise, earlier.get((seed, noise))) for noise in noises for seed in options.seeds
-        ]
-        try:
-            for run in track(as_completed(runs), "seeds", len(runs), console=progress):
-                records = sorted(
-                    [*records, run.result()], key=lambda record: (record.get("noise", 0.0), record["seed"])
-                )
-                if options.verbose:
-                    tell(console, run.result())
-                if options.json:
-                    write(options.json, records, options.frictionless)
-        except KeyboardInterrupt:
-            pool.shutdown(wait=False, cancel_futures=True)
-            progress.print(f"interrupted: {len(records)} of {len(runs)} experiments")
+    records = saved(options.show) if options.show else run(options)
     if records:
-        (show_frictionless if options.frictionless else show)(records, console)
+        (show_frictionless if "noise" in records[0] else show)(records, Console(width=200))
 
 
 if __name__ == "__main__":
