@@ -143,7 +143,7 @@ def best_fit(experiment: Experiment, *, told: bool, filtered: bool = False) -> F
     log, bodies = read_log(experiment, told), experiment.truth.bodies
     scale = experiment.faults.scale if told else np.ones(experiment.mechanism.robot.nv)
     highest = HIGHEST_SHARE * log.rate
-    found = []
+    found, fresh = [], None
     for cutoff in np.unique(np.minimum(CUTOFFS * velocity_band(experiment), highest)):
         state = log.motion(min(SMOOTHER * cutoff, highest) if filtered else cutoff)
         terms = experiment.truth.terms if told else ordinary_terms(state)
@@ -153,7 +153,9 @@ def best_fit(experiment: Experiment, *, told: bool, filtered: bool = False) -> F
         else:
             A = regressor(bodies, terms, state, rows)
         x = solve(A, low_pass(log.torque, cutoff, log.rate)[rows])
-        predicted = regressor(bodies, terms, experiment.fresh) @ x * scale
+        if fresh is None or not told:
+            fresh = regressor(bodies, terms, experiment.fresh)
+        predicted = fresh @ x * scale
         found.append(Fit(relative_error(predicted, experiment.fresh_torque), float(cutoff)))
     return min(found, key=lambda fit: fit.error)
 
