@@ -33,7 +33,9 @@ def nearest_plain_friction(
     friction = {column for part in regressor.parts if part.kind.is_friction for column in part.columns}
     found = {kind: np.zeros(len(moments.joints)) for kind in PLAIN}
     for joint, dof in enumerate(moments.joints):
-        gram = moments.gram[:, joint, :-1, :-1].sum(axis=0)
+        row, squares = moments.of_joint(joint)
+        gram = np.zeros((len(columns), len(columns)))
+        gram[row[:, None], row] = squares[:, :-1, :-1].sum(axis=0)
         own = {kind: places[name] for kind in PLAIN if (name := f"{dof}.{kind}") in places}
         other = [places[name] for name in homeless if places[name] in friction]
         other = [column for column in other if gram[column, column] > 0.0]

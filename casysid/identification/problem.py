@@ -98,16 +98,16 @@ def build_problem(
     moments = sum_moments(regressor, motions, cutoff, settings)
     if input_noise is not None:
 
-        def sums_of(disturbed: Sequence[Recording]) -> Array:
+        def sums_of(disturbed: Sequence[Recording]) -> Moments:
             noisier = [
                 dataclasses.replace(
                     make_motion(robot, recording, cutoff, smoothing=motion.cutoff), standing=motion.standing
                 )
                 for recording, motion in zip(disturbed, motions, strict=True)  # the same equations, noisier
             ]
-            return sum_moments(regressor, noisier, cutoff, settings).gram
+            return sum_moments(regressor, noisier, cutoff, settings)
 
-        added = noise_moments(regressor, recordings, noise, moments.gram, sums_of, as_logged=cutoff is None)
+        added = noise_moments(regressor, recordings, noise, moments, sums_of, as_logged=cutoff is None)
         moments = dataclasses.replace(moments, noise=added, noise_error=input_noise.relative_error)
     return LinearProblem(regressor, motions, moments, cutoff, input_noise)
 
