@@ -60,7 +60,9 @@ class NpzTable:
                 for member in members.values():
                     member.skip(first)
                 for _ in range(first, rows, BATCH):
-                    arrays = {key: member.read(BATCH) for key, member in members.items()}
+                    arrays = {}
+                    for key, member in members.items():
+                        arrays[key] = member.read(BATCH)
                     yield {
                         name: arrays[key] if k is None else arrays[key][:, k]
                         for name, (key, k) in ((name, self.columns[name]) for name in names)
