@@ -1,41 +1,66 @@
 """Symbolic kinematics and dynamics, the regressor with friction, and their evaluation in bulk."""
 
 from casysid.dynamics.bulk import Bulk
-from casysid.dynamics.drive import Parameter
+from casysid.dynamics.drive import FrictionPart, Parameter
 from casysid.dynamics.friction import (
     DEFAULT_FRICTION,
+    FRICTION_KINDS,
     Armature,
+    AsymmetricViscous,
     Coulomb,
+    CoulombRipple,
+    Counterweight,
     Coupling,
     Direction,
+    DriveState,
     FrictionColumn,
+    FrictionKind,
+    FrictionModel,
+    JointUse,
+    Law,
+    LoadedCoulomb,
     Offset,
+    PowerViscous,
+    Ripple,
     SmoothSign,
+    Spring,
+    Stribeck,
+    Term,
     Viscous,
     with_width,
 )
-from casysid.dynamics.friction_kinds import AsymmetricViscous, LoadedCoulomb, PowerViscous, Spring, Stribeck
 from casysid.dynamics.functions import Dynamics, build_dynamics, generate_c
 from casysid.dynamics.regressor import Regressor, build_regressor, extend_regressor
 
 __all__ = [
     "DEFAULT_FRICTION",
+    "FRICTION_KINDS",
     "Armature",
     "AsymmetricViscous",
     "Bulk",
     "Coulomb",
+    "CoulombRipple",
+    "Counterweight",
     "Coupling",
     "Direction",
+    "DriveState",
     "Dynamics",
     "FrictionColumn",
+    "FrictionKind",
+    "FrictionModel",
+    "FrictionPart",
+    "JointUse",
+    "Law",
     "LoadedCoulomb",
     "Offset",
     "Parameter",
     "PowerViscous",
     "Regressor",
+    "Ripple",
     "SmoothSign",
     "Spring",
     "Stribeck",
+    "Term",
     "Viscous",
     "build_dynamics",
     "build_regressor",

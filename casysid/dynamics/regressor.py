@@ -15,8 +15,8 @@ import numpy.typing as npt
 from casysid.arrays import Array, frozen
 from casysid.dynamics import symbolic
 from casysid.dynamics.bulk import Bulk
-from casysid.dynamics.drive import ColumnMaker, Parameter
-from casysid.dynamics.friction import DEFAULT_FRICTION, Coupling, Direction, FrictionColumn, SmoothSign
+from casysid.dynamics.drive import FrictionPart, Parameter, PartMaker
+from casysid.dynamics.friction import DEFAULT_FRICTION, Coupling, Direction, FrictionKind, Law
 from casysid.dynamics.joints import constant
 from casysid.dynamics.template import Template, build_template, finish_template
 from casysid.errors import ParameterError
@@ -28,15 +28,17 @@ class Regressor:
     """``tau = Y(q, v, a) θ``, for one robot with its friction.
 
     Attributes:
-        template: What this regressor is with its smooth signs' widths left open.
-        widths: Of the smooth signs, in the order of ``template.signs``.
-        friction: Kinds of friction in it.
+        template: What this regressor is with its friction's numbers left open.
+        numbers: Those, in the order of ``template.parts``.
+        parts: Friction in it, in the order of its columns.
+        friction: Kinds of friction that every joint was given.
         couplings: Transmissions in it.
     """
 
     template: Template
-    widths: Array
-    friction: tuple[FrictionColumn, ...] = ()
+    numbers: Array
+    parts: tuple[FrictionPart, ...]
+    friction: tuple[FrictionKind, ...] = ()
     couplings: tuple[Coupling, ...] = ()
 
     @property
@@ -59,6 +61,19 @@ class Regressor:
         """The model file's parameters, shape (p,)."""
         return frozen([parameter.prior for parameter in self.parameters])
 
+    @cached_property
+    def friction_laws(self) -> tuple[Law, ...]:
+        """What friction's parameters obey beside the signs of each."""
+        beside: dict[str, dict[str, str]] = {}
+        for part in self.parts:
+            for column in part.columns:
+                beside.setdefault(part.direction.name, {}).setdefault(self.parameters[column].kind, self.names[column])
+        return tuple(
+            law
+            for part in self.parts
+            for law in part.kind.laws([self.names[column] for column in part.columns], beside[part.direction.name])
+        )
+
     @property
     def row_columns(self) -> tuple[npt.NDArray[np.intp], ...]:
         """For each degree of freedom, the columns that are structurally nonzero in its row of ``Y``."""
@@ -69,7 +84,7 @@ class Regressor:
         """``casadi.Function`` ``(q, v, a) -> Y``, sparse, shape (nv, p)."""
         state = symbolic.State.of(self.robot)
         inputs = [state.q, state.v, state.a]
-        Y = self.template.function(*inputs, constant(self.widths))
+        Y = self.template.function(*inputs, constant(self.numbers))
         return ca.Function("regressor", inputs, [Y], ["q", "v", "a"], ["Y"], {"cse": True})
 
     @cached_property
@@ -77,7 +92,7 @@ class Regressor:
         """``casadi.Function`` ``(q, v, a, parameters) -> tau``, which is ``Y θ`` in fewer operations."""
         state, theta = symbolic.State.of(self.robot), ca.SX.sym("parameters", len(self.parameters))
         inputs = [state.q, state.v, state.a, theta]
-        tau = self.template.torque(*inputs, constant(self.widths))
+        tau = self.template.torque(*inputs, constant(self.numbers))
         return ca.Function("torque", inputs, [tau], ["q", "v", "a", "parameters"], ["tau"], {"cse": True})
 
     @property
@@ -86,7 +101,7 @@ class Regressor:
 
         The entries of row ``i`` belong to the columns ``row_columns[i]``.
         """
-        return self.template.equations.given(self.widths)
+        return self.template.equations.given(self.numbers)
 
     def evaluate(self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike) -> Array:
         """``Y`` at every sample, dense, shape (N, nv, p): 8 N nv p bytes.
@@ -124,12 +139,12 @@ class Regressor:
         Raises:
             ParameterError: When a shape does not fit.
         """
-        return self.template.torques.given(self.widths).evaluate(q, v, a, parameters)
+        return self.template.torques.given(self.numbers).evaluate(q, v, a, parameters)
 
 
 def build_regressor(
     robot: Robot,
-    friction: Sequence[FrictionColumn] = DEFAULT_FRICTION,
+    friction: Sequence[FrictionKind] = DEFAULT_FRICTION,
     couplings: Sequence[Coupling] = (),
     *,
     quasi_static: bool = False,
@@ -139,8 +154,8 @@ def build_regressor(
 
     Args:
         robot: Its links give ten columns each.
-        friction: Columns of every driven degree of freedom, and of every coupling as far as they depend on motion
-            there (a coupling's constant torque is a sum of its joints' constant torques).
+        friction: Kinds that act on every driven degree of freedom, and on every coupling as far as motion changes them
+            (a coupling's constant torque is a sum of its joints' constant torques).
         couplings: Motors that act on several joints.
         quasi_static: Torques hold gravity and friction, but nothing inertial: for links velocity and acceleration, for
             drives acceleration count as zero.
@@ -159,34 +174,46 @@ def build_regressor(
     if len(set(kinds)) != len(kinds) or len(set(coupled)) != len(coupled):
         raise ParameterError(f"friction: every kind and every coupling once; got {kinds} and {coupled}")
     template = build_template(robot, friction, couplings, quasi_static, gains.tolist())
+    by_name = {kind.kind: kind for kind in friction}
+    parts = tuple(replace(part, kind=by_name[part.kind.kind]) for part in template.parts)
     return Regressor(
-        template=template, widths=template.widths(friction), friction=tuple(friction), couplings=tuple(couplings)
+        template=template,
+        numbers=_numbers(parts),
+        parts=parts,
+        friction=tuple(friction),
+        couplings=tuple(couplings),
     )
 
 
-def extend_regressor(regressor: Regressor, columns: Sequence[tuple[FrictionColumn, Direction]]) -> Regressor:
-    """A regressor with further columns, each along one direction, named by their place so that kinds may repeat.
+def extend_regressor(regressor: Regressor, additions: Sequence[tuple[FrictionKind, Direction]]) -> Regressor:
+    """A regressor with further friction, each along one direction, named by its place so that kinds may repeat.
 
     Raises:
-        ParameterError: A column is not there along its direction, or uses a position that is none.
+        ParameterError: A kind does not act along its direction, or uses a position that is none.
     """
     robot, state = regressor.robot, symbolic.State.of(regressor.robot)
-    column_along = ColumnMaker(robot, state)
-    extra = [column_along(column, direction, 0.0) for column, direction in columns]
-    missing = [
-        f"{column.kind} of {direction.name}" for (column, direction), e in zip(columns, extra, strict=True) if e is None
-    ]
+    part_along = PartMaker(robot, state)
+    found = [(kind, direction, next(part_along(kind, direction), None)) for kind, direction in additions]
+    missing = [f"{kind.kind} of {direction.name}" for kind, direction, part in found if part is None]
     if missing:
         raise ParameterError(f"friction: no column for {', '.join(missing)}")
-    found = [entry for entry in extra if entry is not None]
+    extra = [part for _, _, part in found if part is not None]
     parameters = (
         *regressor.parameters,
-        *(replace(parameter, name=f"{parameter.name} #{k}") for k, (parameter, _) in enumerate(found)),
+        *(
+            replace(parameter, name=f"{parameter.name} #{k}")
+            for k, part in enumerate(extra)
+            for parameter in part.parameters
+        ),
     )
-    matrix = ca.horzcat(ca.SX(robot.nv, 0), *(torque for _, torque in found))
+    matrix = ca.horzcat(ca.SX(robot.nv, 0), *(part.torques for part in extra))
     theta, p = ca.SX.sym("parameters", len(parameters)), len(regressor.parameters)
     inputs = (state.q, state.v, state.a)
     Y, tau = ca.horzcat(regressor.function(*inputs), matrix), regressor.torque(*inputs, theta[:p]) + matrix @ theta[p:]
-    template = finish_template(robot, state, parameters, Y, theta, tau, column_along.signs)
-    smooth = [(column, direction) for column, direction in columns if isinstance(column, SmoothSign)]
-    return Regressor(template=template, widths=frozen([column.width_at(direction) for column, direction in smooth]))
+    template = finish_template(robot, state, parameters, Y, theta, tau, extra)
+    return Regressor(template=template, numbers=_numbers(template.parts), parts=(*regressor.parts, *template.parts))
+
+
+def _numbers(parts: Sequence[FrictionPart]) -> Array:
+    """What enters nonlinearly, in the order of the parts."""
+    return frozen([number for part in parts for number in part.kind.numbers(part.direction)])
