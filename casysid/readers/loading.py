@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from casysid.arrays import Array
+from casysid.errors import RecordingError
 from casysid.readers.angles import check_quaternions, unwrap_angles
-from casysid.readers.checks import check_samples
+from casysid.readers.checks import check_samples, check_steps
 from casysid.readers.columns import match_columns
 from casysid.readers.table import open_table
 from casysid.readers.units import check_units
@@ -24,6 +25,13 @@ def load_recording(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]
     Raises:
         RecordingError: If it cannot be used.
     """
+    try:
+        return _load(path, robot)
+    except MemoryError as error:
+        raise RecordingError(f"{path}: the recording does not fit into memory ({error}); cut it into pieces") from error
+
+
+def _load(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]]:
     table = open_table(path)
     layout = match_columns(table.names, robot.channels, robot.dofs, str(path))
     columns = table.read(layout.used)
@@ -42,6 +50,9 @@ def load_recording(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]
     check_quaternions(logged, robot)
     check_units(logged, robot)
     recording, unwrapped = unwrap_angles(logged, robot)
+    if recording.time is not None:
+        for name, position in zip(layout.position, recording.position.T, strict=True):
+            check_steps(table, name, recording.time, position, str(path))
     return recording, (*unwrapped, *find_weaknesses(recording, robot))
 
 

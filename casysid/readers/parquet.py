@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from casysid.archives import Unpackable, check_ratio
 from casysid.arrays import Array
 from casysid.errors import RecordingError
 
@@ -30,27 +32,48 @@ class ParquetTable:
         from pyarrow import parquet
 
         try:
-            table = parquet.ParquetFile(self.path).read(columns=list(names))
-        except (pa.ArrowException, OSError) as error:
-            raise RecordingError(
-                f"{self.path}: the Parquet file is damaged ({error}); copy or record it again"
-            ) from error
-        return {name: self._numbers(name, table.column(name)) for name in names}
+            file = parquet.ParquetFile(self.path)
+            for name in names:
+                self._refuse_no_numbers(name, file.schema_arrow.field(name).type)
+            packed, unpacked = _sizes(file.metadata, frozenset(names))
+        except (pa.ArrowException, OSError, KeyError, UnicodeDecodeError) as error:
+            raise self._damage(error) from error
+        try:
+            check_ratio(packed, unpacked)
+            table = file.read(columns=list(names))
+            return {name: np.asarray(table.column(name).cast(pa.float64(), safe=False).to_numpy()) for name in names}
+        except Unpackable as error:
+            raise RecordingError(f"{self.path}: {error}") from error
+        except (pa.ArrowException, OSError, KeyError, UnicodeDecodeError) as error:
+            raise self._damage(error) from error
 
     def place(self, row: int) -> str:
         """Row, counted from 1."""
         return f"row {row + 1} (the first is row 1)"
 
-    def _numbers(self, name: str, column: object) -> Array:
+    def _refuse_no_numbers(self, name: str, kind: object) -> None:
         import pyarrow as pa
 
-        kind = column.type  # type: ignore[attr-defined]
         if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)):
             raise RecordingError(
-                f"{self.path}: column '{name}' holds {kind}, wanted numbers in SI units (time in seconds); "
+                f"{self.path}: column '{name}' holds {str(kind)[:80]}, wanted numbers in SI units (time in seconds); "
                 "convert the column and write the file again"
             )
-        return np.asarray(column.cast(pa.float64(), safe=False).to_numpy())  # type: ignore[attr-defined]
+
+    def _damage(self, error: Exception) -> RecordingError:
+        if isinstance(error, MemoryError):
+            return RecordingError(f"{self.path}: a column does not fit into memory ({error}); cut the recording")
+        return RecordingError(f"{self.path}: the Parquet file is damaged ({error}); copy or record it again")
+
+
+def _sizes(metadata: Any, names: frozenset[str]) -> tuple[int, int]:
+    """Bytes of some columns in the file, and as float64."""
+    packed = 0
+    for group in range(metadata.num_row_groups):
+        row_group = metadata.row_group(group)
+        chunks = (row_group.column(k) for k in range(row_group.num_columns))
+        packed += sum(max(chunk.total_compressed_size, 0) for chunk in chunks if chunk.path_in_schema in names)
+    return packed, 8 * metadata.num_rows * len(names)
 
 
 def open_parquet(path: Path) -> ParquetTable:
@@ -64,6 +87,10 @@ def open_parquet(path: Path) -> ParquetTable:
 
     try:
         names = parquet.ParquetFile(path).schema_arrow.names
-    except (pa.ArrowException, OSError) as error:
+    except UnicodeDecodeError as error:
+        raise RecordingError(
+            f"{path}: the name of a column is not UTF-8 text ({error}); rename it where the file is written"
+        ) from error
+    except (pa.ArrowException, OSError, KeyError) as error:
         raise RecordingError(f"{path}: not a Parquet file, or cut off ({error}); copy or record it again") from error
     return ParquetTable(path, tuple(names))

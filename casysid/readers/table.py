@@ -8,6 +8,7 @@ from typing import Protocol
 
 from casysid.arrays import Array
 from casysid.errors import RecordingError
+from casysid.readers.columns import refuse_too_many
 
 TEXT_SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".txt", ".txt.gz")
 PARQUET_SUFFIXES = (".parquet", ".pq")
@@ -52,10 +53,11 @@ def open_table(path: Path) -> Table:
     from casysid.readers.parquet import open_parquet
     from casysid.readers.text import open_text
 
-    if not path.exists():
-        raise RecordingError(f"{path}: no such file; looked from {Path.cwd()}")
+    _refuse_no_file(path)
     if path.is_dir():
         raise RecordingError(f"{path}: is a directory; name the log files in it")
+    if not path.is_file():
+        raise RecordingError(f"{path}: is no regular file; copy what it gives to a file and name that")
     if path.stat().st_size == 0:
         raise RecordingError(f"{path}: the file is empty; record again or name another log")
     openers = (
@@ -64,9 +66,20 @@ def open_table(path: Path) -> Table:
     suffix = suffix_of(path)
     if suffix in openers:
         try:
-            return openers[suffix](path)
+            table = openers[suffix](path)
         except PermissionError as error:
             raise RecordingError(f"{path}: may not be read; change its permissions") from error
+        refuse_too_many(len(table.names), str(path))
+        return table
     raise RecordingError(
         f"{path}: '{suffix or path.name}' is no known kind of log; convert it to one of {', '.join(SUFFIXES)}"
     )
+
+
+def _refuse_no_file(path: Path) -> None:
+    try:
+        there = path.exists()
+    except OSError as error:  # such as a name longer than the file system's
+        raise RecordingError(f"{path}: cannot be opened: {error.strerror}") from error
+    if not there:
+        raise RecordingError(f"{path}: no such file; looked from {Path.cwd()}")

@@ -140,7 +140,8 @@ def test_what_is_written_is_read_back_exactly(recording: Recording, suffix: str)
     plausible = dataclasses.replace(
         recording,
         position=np.clip(recording.position, -2.0, 2.0) + 1e-3 * wave,
-        velocity=None if recording.velocity is None else 0.0 * wave - recording.velocity,
+        velocity=None if recording.velocity is None else 0.0 * wave - np.clip(recording.velocity, -1e9, 1e9),
+        acceleration=None if recording.acceleration is None else np.clip(recording.acceleration, -1e9, 1e9),
         torque=np.clip(recording.torque, -1e3, 1e3) + wave,
     )
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
