@@ -49,7 +49,7 @@ BROKEN = {
         tree(DEEPEST_CHAIN + 1, "fixed", chain=True),
         "'l1001' is 1001 joints from the base; at most 1000",
     ),
-    "origin": (ARM.replace('xyz="0 0 0.3"', 'xyz="0 0 1e300"'), "below 1e+09"),
+    "origin": (ARM.replace('xyz="0 0 0.3"', 'xyz="0 0 1e300"'), r"below 1e\+09"),
     "replicas": (model(REPLICA.format(1_000_000, JOINTED)), "at most 5000 bodies"),
     "replicas of replicas": (model(REPLICA.format(100, REPLICA.format(100, JOINTED))), "at most 5000 bodies"),
     "replicated geoms": (model(JOINTED + REPLICA.format("1e5", '<geom size="1"/>')), "5000 copies"),
