@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from casysid.arrays import Array
 from casysid.dynamics import symbolic
@@ -70,6 +71,7 @@ class SymbolicPart:
         parameters: Of its terms.
         torques: Of all joints for parameters of one, expressions of shape (nv, terms).
         numbers: Symbols that stand for the kind's numbers, (n,).
+        histories: Symbols that stand for its histories, (m,).
     """
 
     kind: FrictionKind
@@ -77,6 +79,7 @@ class SymbolicPart:
     parameters: tuple[Parameter, ...]
     torques: Any
     numbers: Any
+    histories: Any
 
 
 def drive_parts(
@@ -125,11 +128,18 @@ class PartMaker:
         weights, state = constant(direction.weights), self.state
         s, ds, dds = (weights.T @ x for x in (self._positions, state.v, state.a))
         numbers = ca.SX.sym("numbers", len(kind.with_open_numbers().numbers(direction)))
+        histories = ca.SX.sym("history", len(kind.histories(direction)))
         load = partial(self._static_torque, kind, weights)
         along = DriveState(
-            position=s, velocity=ds, acceleration=dds, numbers=tuple(ca.vertsplit(numbers)), static_torque=load
+            position=s,
+            velocity=ds,
+            acceleration=dds,
+            numbers=tuple(ca.vertsplit(numbers)),
+            histories=tuple(ca.vertsplit(histories)),
+            robot=(state.q, state.v, state.a),
+            static_torque=load,
         )
-        torques, parameters, moving = [], [], ca.vertcat(state.q, state.v, state.a)
+        torques, parameters, moving = [], [], ca.vertcat(state.q, state.v, state.a, histories)
         for term in kind.terms(direction, along):
             torque = ca.SX(term.torque)
             if ca.depends_on(torque, self._missing):
@@ -142,7 +152,7 @@ class PartMaker:
                 name = f"{direction.name}.{term.name}"
                 parameters.append(Parameter(name, direction.name, term.name, term.unit, term.non_negative, prior))
         if parameters:
-            yield SymbolicPart(kind, direction, tuple(parameters), ca.horzcat(*torques), numbers)
+            yield SymbolicPart(kind, direction, tuple(parameters), ca.horzcat(*torques), numbers, histories)
 
     def _static_torque(self, kind: FrictionKind, weights: Any, parameters: Array | None) -> Any:
         """What gravity asks along a direction of links with some parameters, (10 links,)."""
@@ -172,3 +182,19 @@ def _positions(robot: Robot, state: symbolic.State) -> tuple[Any, Any]:
                 cosine, sine = ca.vertsplit(state.q[joint.q])
                 positions[joint.v] = ca.atan2(sine, cosine)
     return positions, missing
+
+
+def continued_positions(robot: Robot, q: Array) -> Array:
+    """The coordinate of each degree of freedom, shape (N, nv), from configurations (N, nq) in order of time.
+
+    Angles of joints that turn without end go on beyond a turn; where there is no coordinate it is zero.
+    """
+    positions = np.zeros((len(q), robot.nv))
+    for joint in robot.joints:
+        match joint.kind:
+            case JointKind.REVOLUTE | JointKind.PRISMATIC:
+                positions[:, joint.v] = q[:, joint.q]
+            case JointKind.CONTINUOUS:
+                cosine, sine = q[:, joint.q].T
+                positions[:, joint.v.start] = np.unwrap(np.arctan2(sine, cosine))
+    return positions

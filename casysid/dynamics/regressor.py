@@ -15,7 +15,7 @@ import numpy.typing as npt
 from casysid.arrays import Array, frozen
 from casysid.dynamics import symbolic
 from casysid.dynamics.bulk import Bulk
-from casysid.dynamics.drive import FrictionPart, Parameter, PartMaker
+from casysid.dynamics.drive import FrictionPart, Parameter, PartMaker, continued_positions
 from casysid.dynamics.friction import DEFAULT_FRICTION, Coupling, Direction, FrictionKind, Law
 from casysid.dynamics.joints import constant
 from casysid.dynamics.template import Template, build_template, finish_template
@@ -80,43 +80,87 @@ class Regressor:
         return self.template.row_columns
 
     @cached_property
+    def history_count(self) -> int:
+        """How many signals of the motion before it asks for."""
+        return int(self.template.function.nnz_in("histories"))
+
+    @cached_property
     def function(self) -> Any:
-        """``casadi.Function`` ``(q, v, a) -> Y``, sparse, shape (nv, p)."""
-        state = symbolic.State.of(self.robot)
-        inputs = [state.q, state.v, state.a]
-        Y = self.template.function(*inputs, constant(self.numbers))
-        return ca.Function("regressor", inputs, [Y], ["q", "v", "a"], ["Y"], {"cse": True})
+        """``casadi.Function`` ``(q, v, a) -> Y``, sparse, shape (nv, p); with histories, if any, as last input."""
+        state, histories = symbolic.State.of(self.robot), self._history_symbols
+        inputs = [state.q, state.v, state.a, *histories]
+        Y = self.template.function(*inputs, *([] if histories else [ca.SX(0, 1)]), constant(self.numbers))
+        names = ["q", "v", "a", "histories"][: len(inputs)]
+        return ca.Function("regressor", inputs, [Y], names, ["Y"], {"cse": True})
 
     @cached_property
     def torque(self) -> Any:
-        """``casadi.Function`` ``(q, v, a, parameters) -> tau``, which is ``Y θ`` in fewer operations."""
-        state, theta = symbolic.State.of(self.robot), ca.SX.sym("parameters", len(self.parameters))
-        inputs = [state.q, state.v, state.a, theta]
-        tau = self.template.torque(*inputs, constant(self.numbers))
-        return ca.Function("torque", inputs, [tau], ["q", "v", "a", "parameters"], ["tau"], {"cse": True})
+        """``casadi.Function`` ``(q, v, a, parameters) -> tau``: ``Y θ`` in fewer operations; histories as there."""
+        state, histories = symbolic.State.of(self.robot), self._history_symbols
+        inputs = [state.q, state.v, state.a, ca.SX.sym("parameters", len(self.parameters)), *histories]
+        tau = self.template.torque(*inputs, *([] if histories else [ca.SX(0, 1)]), constant(self.numbers))
+        names = ["q", "v", "a", "parameters", "histories"][: len(inputs)]
+        return ca.Function("torque", inputs, [tau], names, ["tau"], {"cse": True})
+
+    @property
+    def _history_symbols(self) -> list[Any]:
+        return [ca.SX.sym("histories", self.history_count)] if self.history_count else []
 
     @property
     def equations(self) -> Bulk:
-        """Bulk evaluation of ``(q, v, a, tau)`` -> for each degree of freedom its row's nonzeros, then its torque.
+        """Bulk evaluation of ``(q, v, a, tau)``, with :meth:`histories` as a fifth input where there are any.
 
-        The entries of row ``i`` belong to the columns ``row_columns[i]``.
+        Gives for each degree of freedom its row's nonzeros, then its torque; the entries of row ``i`` belong to the
+        columns ``row_columns[i]``.
         """
-        return self.template.equations.given(self.numbers)
+        return self._settled(self.template.equations)
 
-    def evaluate(self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike) -> Array:
+    def _settled(self, bulk: Bulk) -> Bulk:
+        return bulk.given(*([] if self.history_count else [np.zeros(0)]), self.numbers)
+
+    def histories(self, q: npt.ArrayLike, time: npt.ArrayLike | None = None) -> tuple[Array, ...]:
+        """What friction remembers at every sample, as one input of shape (N, m) more; nothing if it remembers nothing.
+
+        Args:
+            q: Configurations in order of time, shape (N, nq).
+            time: [s], shape (N,); None numbers the samples.
+
+        Raises:
+            ParameterError: A shape does not fit.
+        """
+        if not self.history_count:
+            return ()
+        rows = np.asarray(q, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != self.robot.nq:
+            raise ParameterError(
+                f"friction: what remembers needs q of many samples, (N, {self.robot.nq}); got {rows.shape}"
+            )
+        at = np.arange(len(rows), dtype=np.float64) if time is None else np.asarray(time, dtype=np.float64)
+        positions = continued_positions(self.robot, rows)
+        signals = [
+            history.values(at, positions @ part.direction.weights)
+            for part in self.parts
+            for history in part.kind.histories(part.direction)
+        ]
+        return (np.stack(signals, axis=1),)
+
+    def evaluate(
+        self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike, *, time: npt.ArrayLike | None = None
+    ) -> Array:
         """``Y`` at every sample, dense, shape (N, nv, p): 8 N nv p bytes.
 
         Args:
             q: Configurations, shape (N, nq).
             v: Velocities, shape (N, nv).
             a: Accelerations, shape (N, nv).
+            time: As for :meth:`histories`.
 
         Raises:
             ParameterError: When a shape does not fit.
         """
         nv, p = self.robot.nv, len(self.parameters)
         rows = self.equations
-        inputs, samples = rows.check((q, v, a, np.zeros(nv)))
+        inputs, samples = rows.check((q, v, a, np.zeros(nv), *self.histories(q, time)))
         out = np.zeros((samples, nv * p))
         places = np.concatenate([np.append(dof * p + columns, -1) for dof, columns in enumerate(self.row_columns)])
         filled = places >= 0  # without the torques
@@ -127,7 +171,15 @@ class Regressor:
         deque(rows.map(keep, inputs, [np.arange(samples)], threads=2), maxlen=0)
         return out.reshape(samples, nv, p)
 
-    def predict(self, parameters: npt.ArrayLike, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike) -> Array:
+    def predict(
+        self,
+        parameters: npt.ArrayLike,
+        q: npt.ArrayLike,
+        v: npt.ArrayLike,
+        a: npt.ArrayLike,
+        *,
+        time: npt.ArrayLike | None = None,
+    ) -> Array:
         """Torques at every sample, shape (N, nv), in memory of that size.
 
         Args:
@@ -135,11 +187,12 @@ class Regressor:
             q: Configurations, shape (N, nq).
             v: Velocities, shape (N, nv).
             a: Accelerations, shape (N, nv).
+            time: As for :meth:`histories`.
 
         Raises:
             ParameterError: When a shape does not fit.
         """
-        return self.template.torques.given(self.numbers).evaluate(q, v, a, parameters)
+        return self._settled(self.template.torques).evaluate(q, v, a, parameters, *self.histories(q, time))
 
 
 def build_regressor(
@@ -208,9 +261,11 @@ def extend_regressor(regressor: Regressor, additions: Sequence[tuple[FrictionKin
     )
     matrix = ca.horzcat(ca.SX(robot.nv, 0), *(part.torques for part in extra))
     theta, p = ca.SX.sym("parameters", len(parameters)), len(regressor.parameters)
-    inputs = (state.q, state.v, state.a)
-    Y, tau = ca.horzcat(regressor.function(*inputs), matrix), regressor.torque(*inputs, theta[:p]) + matrix @ theta[p:]
-    template = finish_template(robot, state, parameters, Y, theta, tau, extra)
+    inputs, known = (state.q, state.v, state.a), ca.SX.sym("histories", regressor.history_count)
+    earlier = [known] if regressor.history_count else []
+    Y = ca.horzcat(regressor.function(*inputs, *earlier), matrix)
+    tau = regressor.torque(*inputs, theta[:p], *earlier) + matrix @ theta[p:]
+    template = finish_template(robot, state, parameters, Y, theta, tau, extra, known)
     return Regressor(template=template, numbers=_numbers(template.parts), parts=(*regressor.parts, *template.parts))
 
 

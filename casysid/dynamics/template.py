@@ -34,13 +34,13 @@ KEPT = 4
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Template:
-    """``tau = Y(q, v, a; numbers) θ``.
+    """``tau = Y(q, v, a, histories; numbers) θ``.
 
     Attributes:
         robot: Whose torques these are.
         parameters: What the p columns multiply.
-        function: ``casadi.Function`` ``(q, v, a, numbers) -> Y``, sparse, shape (nv, p).
-        torque: ``casadi.Function`` ``(q, v, a, parameters, numbers) -> tau``.
+        function: ``casadi.Function`` ``(q, v, a, histories, numbers) -> Y``, sparse, shape (nv, p).
+        torque: ``casadi.Function`` ``(q, v, a, parameters, histories, numbers) -> tau``.
         parts: Friction whose open numbers are the last input, in the order of its columns.
     """
 
@@ -58,22 +58,23 @@ class Template:
 
     @cached_property
     def equations(self) -> Bulk:
-        """``(q, v, a, tau, numbers)`` -> for each degree of freedom its row's nonzeros, then its torque."""
+        """``(q, v, a, tau, histories, numbers)`` -> for each degree of freedom its row's nonzeros, then its torque."""
         state, tau = symbolic.State.of(self.robot), ca.SX.sym("tau", self.robot.nv)
         numbers = ca.SX.sym("numbers", self.function.nnz_in("numbers"))
-        Y = self.function(state.q, state.v, state.a, numbers)
+        histories = ca.SX.sym("histories", self.function.nnz_in("histories"))
+        Y = self.function(state.q, state.v, state.a, histories, numbers)
         entries = [
             entry
             for dof, columns in enumerate(self.row_columns)
             for entry in (*(Y[dof, int(column)] for column in columns), tau[dof])
         ]
-        inputs = [state.q, state.v, state.a, tau, numbers]
-        names = ["q", "v", "a", "tau", "numbers"]
+        inputs = [state.q, state.v, state.a, tau, histories, numbers]
+        names = ["q", "v", "a", "tau", "histories", "numbers"]
         return Bulk(ca.Function("equations", inputs, [ca.vertcat(*entries)], names, ["rows"], {"cse": True}))
 
     @cached_property
     def torques(self) -> Bulk:
-        """``(q, v, a, parameters, numbers) -> tau``."""
+        """``(q, v, a, parameters, histories, numbers) -> tau``."""
         return Bulk(self.torque)
 
 
@@ -104,26 +105,33 @@ def finish_template(
     Y: Any,
     theta: Any,
     tau: Any,
-    parts: Sequence[SymbolicPart] = (),
+    parts: Sequence[SymbolicPart],
+    histories: Any,
 ) -> Template:
     """The functions of expressions for ``Y`` and ``tau`` in a state, ``theta`` and the parts' open numbers.
 
-    The parts' columns are the last ones.
+    The parts' columns and histories are the last ones.
     """
     inputs, names = [state.q, state.v, state.a], ["q", "v", "a"]
     numbers = ca.vertcat(ca.SX(0, 1), *(part.numbers for part in parts))
+    histories = ca.vertcat(histories, *(part.histories for part in parts))
     columns = iter(range(len(parameters) - sum(len(part.parameters) for part in parts), len(parameters)))
     return Template(
         robot=robot,
         parameters=parameters,
         function=ca.Function(
-            "regressor", [*inputs, numbers], [ca.sparsify(Y)], [*names, "numbers"], ["Y"], {"cse": True}
+            "regressor",
+            [*inputs, histories, numbers],
+            [ca.sparsify(Y)],
+            [*names, "histories", "numbers"],
+            ["Y"],
+            {"cse": True},
         ),
         torque=ca.Function(
             "torque",
-            [*inputs, theta, numbers],
+            [*inputs, theta, histories, numbers],
             [ca.densify(tau)],
-            [*names, "parameters", "numbers"],
+            [*names, "parameters", "histories", "numbers"],
             ["tau"],
             {"cse": True},
         ),
@@ -151,7 +159,7 @@ def _build(
     measured = ca.diag(constant(np.array(gains)))
     Y = measured @ ca.horzcat(symbolic.regressor(robot, motions), drive_matrix)
     tau = measured @ (symbolic.inverse_dynamics(robot, motions, theta[:rigid]) + drive_matrix @ theta[rigid:])
-    return finish_template(robot, state, parameters, Y, theta, tau, parts)
+    return finish_template(robot, state, parameters, Y, theta, tau, parts, ca.SX(0, 1))
 
 
 _kept = lru_cache(KEPT)(_build)

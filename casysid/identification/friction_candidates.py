@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from casysid.arrays import Array
 from casysid.dynamics import (
-    FRICTION_KINDS,
+    PHYSICAL_KINDS,
     Armature,
     Coulomb,
     Coupling,
@@ -62,7 +62,7 @@ def propose(
     friction: Sequence[FrictionKind],
     couplings: Sequence[Coupling],
     uses: Mapping[int, JointUse],
-    kinds: Sequence[type[FrictionKind]] = FRICTION_KINDS,
+    kinds: Sequence[type[FrictionKind]] = PHYSICAL_KINDS,
 ) -> tuple[Proposal, ...]:
     """Everything that may join the given friction and couplings of a robot.
 

@@ -1,5 +1,6 @@
 """A kind of friction that somebody else wrote, in one class: all that the product asks of a kind, it gets."""
 
+import dataclasses
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from casysid.dynamics import (
     FrictionKind,
     FrictionModel,
     Law,
+    RandomFeatures,
     Spring,
     Stribeck,
     Term,
@@ -67,9 +69,11 @@ class Worn(FrictionKind):
 
 
 def proposals():
-    return propose(
-        ROBOT, DEFAULT_FRICTION, (), joint_uses(ROBOT, np.ones(2), np.full(2, 0.01)), (*FRICTION_KINDS, Worn)
-    )
+    uses = {
+        dof: dataclasses.replace(use, ripple=(7.0,), friction_ripple=(9.0,))
+        for dof, use in joint_uses(ROBOT, np.ones(2), np.full(2, 0.01), np.ones(2)).items()
+    }
+    return propose(ROBOT, DEFAULT_FRICTION, (), uses, (*FRICTION_KINDS, Worn))
 
 
 def motion():
@@ -141,7 +145,9 @@ def test_it_survives_json_where_it_is_named():
         FrictionModel.from_json(content)
 
 
-@pytest.mark.parametrize("kind", FRICTION_KINDS[4:], ids=lambda kind: kind.kind)
+@pytest.mark.parametrize(
+    "kind", [kind for kind in FRICTION_KINDS[4:] if kind is not RandomFeatures], ids=lambda kind: kind.kind
+)
 def test_every_kind_is_described_and_merges_its_candidates(kind):
     alone = [one for one in proposals() if one.kind == kind.kind]
     assert len(alone) >= 2

@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Self
 
 from casysid.arrays import Array
 from casysid.dynamics.friction.direction import Direction
+from casysid.dynamics.friction.history import History
 from casysid.errors import ParameterError
 from casysid.robot import Robot
 
@@ -28,6 +29,8 @@ class DriveState:
         velocity: ``ds/dt``.
         acceleration: ``d²s/dt²``.
         numbers: What stands for the kind's :meth:`FrictionKind.numbers` there.
+        histories: What stands for its :meth:`FrictionKind.histories`.
+        robot: Configuration (nq,), velocities (nv,) and accelerations (nv,) of the whole robot.
         static_torque: Gives what gravity asks along the coordinate of links with some parameters, (10 links,); None for
             the robot's own.
     """
@@ -36,6 +39,8 @@ class DriveState:
     velocity: Any
     acceleration: Any
     numbers: tuple[Any, ...] = ()
+    histories: tuple[Any, ...] = ()
+    robot: tuple[Any, ...] = ()
     static_torque: Callable[[Array | None], Any] = lambda parameters: 0.0
 
 
@@ -126,6 +131,10 @@ class FrictionKind(ABC):
     def with_width(self, width: float | Sequence[float] | Mapping[str, float]) -> Self:
         """With another width of its smooth sign; itself when it has none."""
         return self
+
+    def histories(self, direction: Direction) -> tuple[History, ...]:
+        """What its torque along a direction needs of the motion before, in the order of ``state.histories``."""
+        return ()
 
     @classmethod
     def candidates(cls, use: JointUse) -> Iterator[FrictionKind]:
