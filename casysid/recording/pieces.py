@@ -35,7 +35,8 @@ def pieces(
     """Consecutive pieces, none over a gap, with samples beside the core on either side as far as the stretch has them.
 
     These reach at least ``overlap`` seconds before the core's first sample and after the next core's first one, and
-    are at least as many as the source usually has in that time, so holes that are no gaps count for nothing. In memory are no more than ``rows``, those beside them, and a batch.
+    are at least as many as the source usually has in that time, so holes that are no gaps count for nothing. In memory
+    are no more than ``rows``, those beside them, and a batch.
 
     Args:
         source: With time.
