@@ -11,13 +11,13 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.errors import RecordingError
 from casysid.readers.angles import check_quaternions, unwrap, unwrapped_sentences
-from casysid.readers.checks import SampleChecks
+from casysid.readers.checks import SampleChecks, check_steps
 from casysid.readers.columns import Layout, match_columns
 from casysid.readers.statistics import Statistics
-from casysid.readers.table import Table, open_table
+from casysid.readers.table import Table, all_rows, open_table
 from casysid.readers.units import check_units
 from casysid.readers.weaknesses import find_weaknesses
-from casysid.recording import BATCH, Recording, RecordingFile
+from casysid.recording import Recording, RecordingFile
 from casysid.robot import Robot
 from casysid.threads import single_threaded
 
@@ -29,14 +29,24 @@ def load_recording(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]
     Raises:
         RecordingError: If it cannot be used.
     """
+    try:
+        return _load(path, robot)
+    except MemoryError as error:
+        raise RecordingError(f"{path}: the recording does not fit into memory ({error}); cut it into pieces") from error
+
+
+def _load(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]]:
     table = open_table(path)
     layout = match_columns(table.names, robot.channels, robot.dofs, str(path))
-    columns = table.read(layout.used)
-    rows = len(columns[layout.torque[0]])
-    batches = (
-        {name: values[first : first + BATCH] for name, values in columns.items()} for first in range(0, rows, BATCH)
-    )
-    statistics = _scan(table, layout, robot, str(path), batches)
+    parts: list[dict[str, Array]] = []
+
+    def kept() -> Iterator[dict[str, Array]]:
+        for columns in table.batches(layout.used):
+            parts.append(columns)
+            yield columns
+
+    statistics = _scan(table, layout, robot, str(path), kept())
+    columns = all_rows(layout.used, parts)
     logged = _recording(columns, layout, robot, _about(path, table, layout))
     wrapped = _wrapped(statistics)
     recording = next(unwrap([logged], wrapped)) if wrapped else logged
@@ -142,6 +152,7 @@ def _scan(
     checks.finish()
     check_quaternions(statistics, robot)
     check_units(statistics, robot)
+    check_steps(table, layout, statistics)
     return statistics
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.errors import RecordingError
 from casysid.recording.recording import GAP, Recording, joined
-from casysid.recording.source import BATCH, Source, Stretch, signs_of
+from casysid.recording.source import BATCH, Change, Source, Stretch, signs_of
 from casysid.recording.spectrum import PositionSpectrum
 from casysid.recording.summary import RecordingSummary
 
@@ -93,6 +93,7 @@ class RecordingFile(Source):
         torque_delay: By how much the torque's time stamps are late against the positions' [s].
         time_scale: By which the file's time stamps are multiplied.
         flips: Columns whose signs are turned.
+        changes: What is made of the samples at last; rows are those of the file.
         sources: The file.
         unused_columns: Its columns that were left aside.
     """
@@ -108,6 +109,7 @@ class RecordingFile(Source):
     torque_delay: float = 0.0
     time_scale: float = 1.0
     flips: tuple[str, ...] = ()
+    changes: tuple[Change, ...] = ()
     sources: tuple[str, ...] = ()
     unused_columns: tuple[str, ...] = field(default=(), repr=False)
 
@@ -184,7 +186,10 @@ class RecordingFile(Source):
         for batch in self.log.read(self.first):
             kept = min(len(batch), self.last - row)
             for first in range(0, kept, rows):
-                yield self._as_asked(batch.selected(slice(first, min(first + rows, kept))), signs)
+                part = self._as_asked(batch.selected(slice(first, min(first + rows, kept))), signs)
+                for change in self.changes:
+                    part = change(part, row + first)
+                yield part
             row += kept
             if row >= self.last:
                 return
@@ -270,6 +275,10 @@ class RecordingFile(Source):
             time_scale=self.time_scale * scale,
             torque_delay=self.torque_delay * scale,
         )
+
+    def mapped(self, change: Change) -> RecordingFile:
+        """With other values of as many samples, whatever else is asked for done before; see :meth:`Source.mapped`."""
+        return dataclasses.replace(self, changes=(*self.changes, change))
 
     def with_torque_delay(self, delay: float) -> RecordingFile:
         """Told that its torques are so late [s] in all."""

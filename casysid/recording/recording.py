@@ -21,7 +21,7 @@ import numpy.typing as npt
 from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError, RecordingError
 from casysid.recording.resolution import ResolutionScan
-from casysid.recording.source import BATCH, Source, Stretch, signs_of
+from casysid.recording.source import BATCH, Change, Source, Stretch, signs_of
 from casysid.recording.spectrum import PositionSpectrum, SpectrumScan
 from casysid.recording.summary import RecordingSummary
 
@@ -219,6 +219,10 @@ class Recording(Source):
         if self.time is None:
             return self
         return dataclasses.replace(self, time=self.time * scale, torque_delay=self.torque_delay * scale)
+
+    def mapped(self, change: Change) -> Recording:
+        """What ``change`` makes of the recording, from row 0."""
+        return change(self, 0)
 
     def with_torque_delay(self, delay: float) -> Recording:
         """The recording, told that its torques are so late [s] in all."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
@@ -19,6 +19,9 @@ BATCH = 1 << 16
 """Rows of a batch: some megabytes, of which a step of work is large beside what Python adds to it."""
 EXCERPTS = 16
 """Excerpts of a long recording, by default."""
+
+
+Change = Callable[["Recording", int], "Recording"]
 
 
 class Stretch(NamedTuple):
@@ -150,6 +153,10 @@ class Source(ABC):
     @abstractmethod
     def with_time_scaled(self, scale: float) -> Self:
         """With the time stamps multiplied; velocities and accelerations stay as logged."""
+
+    @abstractmethod
+    def mapped(self, change: Change) -> Self:
+        """With other values of as many samples: ``change`` is given consecutive parts, and the row of their first."""
 
     @abstractmethod
     def with_torque_delay(self, delay: float) -> Self:

@@ -275,7 +275,7 @@ class _MotionMaker:
         own = self._own_time(piece, time)
         wanted = slice(
             int(np.searchsorted(time, time[core.start] - window)),
-            int(np.searchsorted(time, time[core.stop - 1] + window, side="right")),
+            int(np.searchsorted(time, min(own[1], time[-1]) + window, side="right")),
         )
         within = self._within(time, stretch)
         rows = np.arange(wanted.start, wanted.stop)
