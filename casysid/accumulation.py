@@ -18,6 +18,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from casysid.arrays import Array
 from casysid.dynamics.regressor import Regressor
 from casysid.errors import ParameterError
+from casysid.memory import moments_memory, require_memory
 from casysid.moments import Moments
 from casysid.signals.averaging import BandAverage, WindowSums
 
@@ -57,7 +58,8 @@ def accumulate_moments(
         progress: Called with the number of samples done and of all.
 
     Raises:
-        ParameterError: When a shape does not fit, a sample is not finite, or there is no sample.
+        ParameterError: When a shape does not fit, a sample is not finite, there is no sample, or the moments would not
+            fit into memory.
     """
     inputs, samples = regressor.equations.check((q, v, a, tau))
     if any(array.ndim != 2 for array in inputs):
@@ -68,6 +70,7 @@ def accumulate_moments(
         raise ParameterError(f"moments: blocks must be at least 1; got {blocks}")
     groups = np.array_split(chosen, min(blocks, len(chosen)))
     widths = [len(columns) + 1 for columns in regressor.row_columns]
+    _require_memory(regressor, len(groups))
     sums, counts = [np.zeros((len(groups), width, width)) for width in widths], np.zeros((len(groups), len(widths)))
     with threadpool_limits(1, user_api="blas"):  # threads of ours beside threads of BLAS would wait for each other
         if average is None:
@@ -99,6 +102,16 @@ def accumulate_moments(
     for total in sums:
         total.setflags(write=False)
     return Moments(tuple(sums), regressor.row_columns, counts, regressor.names, regressor.robot.dofs)
+
+
+def _require_memory(regressor: Regressor, blocks: int) -> None:
+    """Refuse moments that the machine could not hold in a fit."""
+    joints, p = regressor.robot.nv, len(regressor.names)
+    require_memory(
+        moments_memory([len(columns) for columns in regressor.row_columns], blocks, p),
+        f"moments: a fit of {joints} joints, {p} columns and {blocks} blocks",
+        "Lock joints that do not move, take fewer blocks, or a machine with more memory",
+    )
 
 
 def _reported(

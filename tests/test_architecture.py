@@ -9,7 +9,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "casysid"
 ORDER = (
-    ("errors", "arrays"),
+    ("errors", "arrays", "memory"),
     ("nlp", "inertia"),
     ("robot", "bundled"),
     ("recording", "readers", "dynamics"),
