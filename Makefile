@@ -1,11 +1,12 @@
 # make demo   set up and run the main job
 # make test   set up and pass the tests
 # make lint   style and types
+# make test-environments   the tests once for every number of threads and kind of processor (TESTS="tests/nlp ..." for some)
 PYTHON ?= python3
 VENV   ?= .venv
 OUT    ?= out/demo
 
-.PHONY: demo test lint setup clean
+.PHONY: demo test test-environments lint setup clean
 .DEFAULT_GOAL := demo
 
 setup: $(VENV)/.ready
@@ -18,7 +19,10 @@ demo: setup
 	$(VENV)/bin/python scripts/run_demo.py --out $(OUT)
 
 test: setup
-	OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -n 2 --durations 10
+	$(VENV)/bin/python -m pytest -n 2 --durations 10
+
+test-environments: setup
+	bash scripts/test_environments.sh $(VENV)/bin/python $(TESTS)
 
 lint: setup
 	$(VENV)/bin/ruff check .

@@ -61,7 +61,8 @@ def accumulate_moments(
         ParameterError: When a shape does not fit, a sample is not finite, there is no sample, or the moments would not
             fit into memory.
     """
-    inputs, samples = regressor.equations.check((q, v, a, tau))
+    histories = regressor.histories(q, None if average is None else average.time)
+    inputs, samples = regressor.equations.check((q, v, a, tau, *histories))
     if any(array.ndim != 2 for array in inputs):
         raise ParameterError(f"moments: q, v, a, tau must be (N, n); got {', '.join(str(x.shape) for x in inputs)}")
     chosen, own = _chosen(valid, samples, regressor.robot.nv)
@@ -159,7 +160,7 @@ def _chosen(valid: npt.ArrayLike | None, samples: int, joints: int) -> tuple[npt
 
 
 def _require_finite(inputs: list[Array], chosen: npt.NDArray[np.intp]) -> None:
-    for name, values in zip(("q", "v", "a", "tau"), inputs, strict=True):
+    for name, values in zip(("q", "v", "a", "tau", "histories"), inputs, strict=False):
         finite = np.isfinite(values)
         if finite.all():
             continue

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
-from casysid.dynamics import FrictionColumn, Regressor, build_regressor, with_width
+from casysid.dynamics import FrictionKind, Regressor, build_regressor, with_width
 from casysid.estimation import ErrorsInVariables
 from casysid.identification.noise_moments import noise_moments
 from casysid.identification.settings import Settings
@@ -117,7 +117,7 @@ def with_widths(
     motions: Sequence[Motion],
     relative_width: float | Array,
     input_noise: InputNoise | None = None,
-) -> tuple[FrictionColumn, ...]:
+) -> tuple[FrictionKind, ...]:
     """The friction columns asked for, their smooth signs as sharp as the motions allow."""
     width = settings.coulomb_width or tuple(coulomb_width(motions, relative_width, input_noise).tolist())
     return with_width(settings.friction, width)
