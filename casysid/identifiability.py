@@ -161,7 +161,7 @@ def structural_base_parameters(regressor: Regressor, *, samples: int = 0, seed: 
 def _gram_of_states(regressor: Regressor, q: Array, v: Array, a: Array) -> Array:
     """``Σ x xᵀ`` over states and joints, shape (p, p), in memory of that size."""
     rows, p = regressor.equations, len(regressor.names)
-    inputs, samples = rows.check((q, v, a, np.zeros(regressor.robot.nv)))
+    inputs, samples = rows.check((q, v, a, np.zeros(regressor.robot.nv), *regressor.histories(q)))
     gram = np.zeros((p, p))
     ends = np.cumsum([len(columns) + 1 for columns in regressor.row_columns])
 
