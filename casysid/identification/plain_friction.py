@@ -34,7 +34,7 @@ def nearest_plain_friction(
     found = {kind: np.zeros(len(moments.joints)) for kind in PLAIN}
     for joint, dof in enumerate(moments.joints):
         row, squares = moments.of_joint(joint)
-        gram = np.zeros((len(columns), len(columns)))
+        gram = np.zeros((len(places), len(places)))
         gram[row[:, None], row] = squares[:, :-1, :-1].sum(axis=0)
         own = {kind: places[name] for kind in PLAIN if (name := f"{dof}.{kind}") in places}
         other = [places[name] for name in homeless if places[name] in friction]
