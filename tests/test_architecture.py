@@ -9,7 +9,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "casysid"
 ORDER = (
-    ("errors", "arrays", "archives", "threads"),
+    ("errors", "arrays", "archives", "memory", "threads"),
     ("nlp", "inertia"),
     ("robot", "bundled"),
     ("recording", "readers", "dynamics"),
