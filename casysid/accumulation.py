@@ -1,7 +1,7 @@
 """The one pass over the data: from samples to :class:`~casysid.moments.Moments`, in chunks and in constant memory.
 
 The row of a joint has nonzeros only in the columns of the bodies that it moves and of its own drive. So each joint
-keeps the sum of squares of its own short rows ``[x, y]``, and only the sums are spread over all columns.
+keeps the sum of squares of its own short rows ``[x, y]``.
 """
 
 from __future__ import annotations
@@ -59,7 +59,8 @@ def accumulate_moments(
     Raises:
         ParameterError: When a shape does not fit, a sample is not finite, or there is no sample.
     """
-    inputs, samples = regressor.equations.check((q, v, a, tau))
+    histories = regressor.histories(q, None if average is None else average.time)
+    inputs, samples = regressor.equations.check((q, v, a, tau, *histories))
     if any(array.ndim != 2 for array in inputs):
         raise ParameterError(f"moments: q, v, a, tau must be (N, n); got {', '.join(str(x.shape) for x in inputs)}")
     chosen, own = _chosen(valid, samples, regressor.robot.nv)
@@ -68,17 +69,18 @@ def accumulate_moments(
         raise ParameterError(f"moments: blocks must be at least 1; got {blocks}")
     groups = np.array_split(chosen, min(blocks, len(chosen)))
     widths = [len(columns) + 1 for columns in regressor.row_columns]
-    sums, counts = np.zeros((len(groups), sum(width**2 for width in widths))), np.zeros((len(groups), len(widths)))
+    sums, counts = [np.zeros((len(groups), width, width)) for width in widths], np.zeros((len(groups), len(widths)))
     with single_threaded():
         if average is None:
 
-            def square(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, tuple[Array, Array]]:
+            def square(values: Array, piece: npt.NDArray[np.intp]) -> tuple[int, tuple[Array, list[Array]]]:
                 return len(piece), _squares(values, widths, None if own is None else own[piece])
 
             pieces = regressor.equations.map(square, inputs, groups, threads)
-            for block, (equations, packed) in _reported(pieces, len(chosen), progress):
+            for block, (equations, squares) in _reported(pieces, len(chosen), progress):
                 counts[block] += equations
-                sums[block] += packed
+                for total, own_square in zip(sums, squares, strict=True):
+                    total[block] += own_square
         else:
             windows = [average.windows(group) for group in groups]
             starts = np.array([group[0] for group in groups])
@@ -92,8 +94,12 @@ def accumulate_moments(
             for block, parts in groupby(_reported(filled, len(chosen), progress), itemgetter(0)):
                 rows = windows[block].averages(part for _, part in parts).T
                 kept = None if own is None else rows[-len(widths) :].T <= LARGEST_INVALID_SHARE
-                counts[block], sums[block] = _squares(rows[: sum(widths)], widths, kept)
-    return _spread(regressor, sums, widths, counts)
+                counts[block], squares = _squares(rows[: sum(widths)], widths, kept)
+                for total, own_square in zip(sums, squares, strict=True):
+                    total[block] = own_square
+    for total in sums:
+        total.setflags(write=False)
+    return Moments(tuple(sums), regressor.row_columns, counts, regressor.names, regressor.robot.dofs)
 
 
 def _reported(
@@ -108,8 +114,8 @@ def _reported(
         yield block, part
 
 
-def _squares(values: Array, widths: Sequence[int], kept: Mask | None) -> tuple[Array, Array]:
-    """Rows counted for each joint, and the sums of their squares side by side.
+def _squares(values: Array, widths: Sequence[int], kept: Mask | None) -> tuple[Array, list[Array]]:
+    """Rows counted for each joint, and the sums of its squares.
 
     Args:
         values: The joints' short rows ``[x, y]``, one joint below the other, shape (sum of widths, samples).
@@ -117,25 +123,12 @@ def _squares(values: Array, widths: Sequence[int], kept: Mask | None) -> tuple[A
         kept: Which samples count for which joint, shape (samples, joints); None counts all.
     """
     count = np.full(len(widths), float(values.shape[1])) if kept is None else kept.sum(axis=0, dtype=np.float64)
-    rows, squares = np.cumsum([0, *widths]), np.cumsum([0, *(width**2 for width in widths)])
-    packed = np.empty(squares[-1])
-    for joint, width in enumerate(widths):
-        x = values[rows[joint] : rows[joint + 1]]
+    squares = []
+    for joint, x in enumerate(np.split(values, np.cumsum(widths)[:-1])):
         if kept is not None and count[joint] < x.shape[1]:
             x = x[:, kept[:, joint]]
-        np.matmul(x, x.T, out=packed[squares[joint] : squares[joint + 1]].reshape(width, width))
-    return count, packed
-
-
-def _spread(regressor: Regressor, sums: Array, widths: Sequence[int], counts: Array) -> Moments:
-    """The joints' short sums in their places among all columns."""
-    p, squares = len(regressor.names), np.cumsum([0, *(width**2 for width in widths)])
-    gram = np.zeros((len(sums), regressor.robot.nv, p + 1, p + 1))
-    for joint, columns in enumerate(regressor.row_columns):
-        places, width = np.append(columns, p), len(columns) + 1
-        own = sums[:, squares[joint] : squares[joint + 1]].reshape(-1, width, width)
-        gram[:, joint, places[:, None], places] = own
-    return Moments(gram, counts, regressor.names, regressor.robot.dofs)
+        squares.append(x @ x.T)
+    return count, squares
 
 
 def _chosen(valid: npt.ArrayLike | None, samples: int, joints: int) -> tuple[npt.NDArray[np.intp], Mask | None]:
@@ -154,7 +147,7 @@ def _chosen(valid: npt.ArrayLike | None, samples: int, joints: int) -> tuple[npt
 
 
 def _require_finite(inputs: list[Array], chosen: npt.NDArray[np.intp]) -> None:
-    for name, values in zip(("q", "v", "a", "tau"), inputs, strict=True):
+    for name, values in zip(("q", "v", "a", "tau", "histories"), inputs, strict=False):
         finite = np.isfinite(values)
         if finite.all():
             continue

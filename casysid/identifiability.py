@@ -9,9 +9,12 @@ further directions may be too weak.
 from __future__ import annotations
 
 import enum
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
+from scipy.linalg import solve_triangular
 
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
@@ -22,10 +25,13 @@ from casysid.threads import single_threaded
 
 RANK_TOLERANCE = 3e-5
 """Relative singular values below this are rounding of the model's angles (four digits give 1e-6), not rank."""
-ROUNDING = 1e-13
-"""Eigenvalues of a Gram matrix below this fraction of the largest are rounding of the arithmetic."""
 QUIETEST_COLUMN = 1e-8
 """Columns smaller than this fraction of the largest are rounding of the arithmetic."""
+PANEL = 64
+"""Columns that are eliminated together: products of matrices are many times faster than products of vectors."""
+FEWEST_STATES = 40
+STATES_PER_COLUMN = 2
+"""Random states for each column of the longest row: twice as many equations of one joint as it has unknowns."""
 COEFFICIENT_TOLERANCE = 1e-3
 """Weights in a combination below this fraction of its largest are left out of the words."""
 
@@ -50,7 +56,7 @@ class BaseParameters:
     """
 
     names: tuple[str, ...]
-    independent: Array
+    independent: npt.NDArray[np.intp]
     transform: Array
     condition_number: float
 
@@ -102,40 +108,59 @@ def base_parameters_of_gram(
     energy = np.diag(gram).copy()
     live = energy > quietest**2 * max(energy.max(initial=0.0), np.finfo(np.float64).tiny)
     scale = np.where(live, 1.0 / np.sqrt(np.where(live, energy, 1.0)), 0.0)
-    values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
-    sound = values > ROUNDING * max(values.max(initial=0.0), np.finfo(np.float64).tiny)
-    root = np.sqrt(values[sound])[:, None] * vectors[:, sound].T  # rows whose Gram is the standardised one
-    independent = _independent_columns(root, live, tolerance)
-    weights = np.linalg.lstsq(root[:, independent], root, rcond=None)[0]
+    S = gram * np.outer(scale, scale)
+    independent, echelon = _eliminate(S, live, tolerance**2 * len(S))
+    weights = solve_triangular(echelon[:, independent], echelon)
     transform = weights * scale[independent][:, None] / np.where(live, scale, 1.0)
     transform[:, independent] = np.eye(len(independent))
-    singular = np.linalg.svd(root[:, independent], compute_uv=False) if len(independent) else np.ones(1)
-    return BaseParameters(names, independent, frozen(transform), float(singular[0] / singular[-1]))
+    energies = np.linalg.eigvalsh(S[np.ix_(independent, independent)]) if len(independent) else np.ones(1)
+    condition = float(np.sqrt(energies[-1] / max(energies[0], np.finfo(np.float64).eps * energies[-1])))
+    return BaseParameters(names, independent, frozen(transform), condition)
 
 
-def _independent_columns(root: Array, live: Array, tolerance: float) -> Array:
-    """Columns that are not combinations of those before them (Gram-Schmidt, orthogonalised twice)."""
-    basis = np.empty((root.shape[0], 0))
-    independent = []
-    for column in np.flatnonzero(live):
-        rest = root[:, column]
-        for _ in range(2):
-            rest = rest - basis @ (basis.T @ rest)
-        length = float(np.linalg.norm(rest))
-        if length > tolerance * np.sqrt(root.shape[1]):
-            independent.append(int(column))
-            basis = np.column_stack([basis, rest / length])
-    return np.array(independent, dtype=np.intp)
+def _eliminate(S: Array, live: Array, smallest: float) -> tuple[npt.NDArray[np.intp], Array]:
+    """Columns that are not combinations of those before them, and the rows ``R`` of ``S = Rᵀ R``, shape (r, p).
+
+    A Cholesky factorisation that passes over columns of which those before leave less than ``smallest``: what Gram and
+    Schmidt do to the rows themselves. Coefficients of a column that is passed over are of those before it alone.
+    """
+    p = len(S)
+    R, independent = np.zeros((p, p)), list[int]()
+    for start in range(0, p, PANEL):
+        panel, first = slice(start, start + PANEL), len(independent)
+        left = S[panel, start:] - R[:first, panel].T @ R[:first, start:]
+        for row, column in zip(left, range(start, p), strict=False):
+            rank = len(independent)
+            row = row[column - start :] - R[first:rank, column] @ R[first:rank, column:]
+            if live[column] and row[0] > smallest:
+                R[rank, column:] = row / np.sqrt(row[0])
+                independent.append(column)
+    return np.array(independent, dtype=np.intp), R[: len(independent)]
 
 
 @single_threaded()
 def structural_base_parameters(regressor: Regressor, *, samples: int = 0, seed: int = 0) -> BaseParameters:
     """Base parameters of the mechanism itself, from random states within its limits (Gautier 1991)."""
-    robot = regressor.robot
-    count = samples or 40 + 4 * len(regressor.names)
-    q, v, a = random_states(robot, count, np.random.default_rng(seed))
-    rows = regressor.evaluate(q, v, a).reshape(-1, len(regressor.names))
-    return base_parameters_of_gram(rows.T @ rows, regressor.names, quietest=RANK_TOLERANCE)
+    count = samples or FEWEST_STATES + STATES_PER_COLUMN * max(map(len, regressor.row_columns), default=0)
+    q, v, a = random_states(regressor.robot, count, np.random.default_rng(seed))
+    return base_parameters_of_gram(_gram_of_states(regressor, q, v, a), regressor.names, quietest=RANK_TOLERANCE)
+
+
+def _gram_of_states(regressor: Regressor, q: Array, v: Array, a: Array) -> Array:
+    """``Σ x xᵀ`` over states and joints, shape (p, p), in memory of that size."""
+    rows, p = regressor.equations, len(regressor.names)
+    inputs, samples = rows.check((q, v, a, np.zeros(regressor.robot.nv)))
+    gram = np.zeros((p, p))
+    ends = np.cumsum([len(columns) + 1 for columns in regressor.row_columns])
+
+    def add(values: Array, piece: npt.NDArray[np.intp]) -> None:
+        for columns, end in zip(regressor.row_columns, ends, strict=True):
+            x = values[end - 1 - len(columns) : end - 1]
+            gram[columns[:, None], columns] += x @ x.T
+
+    with single_threaded():
+        deque(rows.map(add, inputs, [np.arange(samples)], threads=1), maxlen=0)
+    return gram
 
 
 @single_threaded()

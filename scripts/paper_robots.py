@@ -199,9 +199,10 @@ class Recorded:
         for motion in motions:  # one by one: all disturbed motions at once would take much memory
             here = sum_moments(regressor, [motion], None, settings)
             grown = [
-                sum_moments(regressor, [self._disturbed(motion, sign)], None, settings).gram for sign in (1.0, -1.0)
+                sum_moments(regressor, [self._disturbed(motion, sign)], None, settings).squares for sign in (1.0, -1.0)
             ]
-            parts.append(dataclasses.replace(here, noise=0.5 * (grown[0] + grown[1]) - here.gram))
+            noise = tuple(0.5 * (one + two) - own for one, two, own in zip(*grown, here.squares, strict=True))
+            parts.append(dataclasses.replace(here, noise=noise))
         return LinearProblem(regressor, (), functools.reduce(operator.add, parts), None)
 
     def _logged(self, path: Path) -> Motion:

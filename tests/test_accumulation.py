@@ -29,7 +29,7 @@ def slowly(regressor, q, v, a, tau, blocks):
     parts = np.array_split(rows, blocks)
     gram = np.array([[part[:, j].T @ part[:, j] for j in range(regressor.robot.nv)] for part in parts])
     count = np.array([[len(part)] * regressor.robot.nv for part in parts], dtype=float)
-    return Moments(gram, count, regressor.names, regressor.robot.dofs)
+    return Moments.from_dense(gram, count, regressor.names, regressor.robot.dofs)
 
 
 def assert_same(got, wanted, relative=1e-12):

@@ -52,16 +52,95 @@ def test_shifting_is_subtracting_a_prediction(seed):
     assert np.allclose(shifted.gram, direct.gram)
 
 
+def draw_sparse(seed: int) -> tuple[Moments, np.ndarray, np.ndarray]:
+    """Three joints with columns of their own, and the same sums and noise among all columns."""
+    rng = np.random.default_rng(seed)
+    blocks, joints, p = 4, 3, 6
+    gram, noise = np.zeros((2, blocks, joints, p + 1, p + 1))
+    for joint in range(joints):
+        places = np.append(np.flatnonzero(rng.random(p) < 0.6), p)
+        for sums in (gram, noise):
+            rows = rng.normal(size=(blocks, 9, len(places)))
+            sums[:, joint, places[:, None], places] = np.swapaxes(rows, 1, 2) @ rows
+    count = rng.integers(1, 9, (blocks, joints))
+    names = tuple("abcdef"), ("one", "two", "three")
+    return Moments.from_dense(gram, count, *names, noise=noise, noise_error=0.2), gram, noise
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds)
+def test_a_joints_own_columns_hold_all_there_is(seed):
+    moments, gram, noise = draw_sparse(seed)
+    assert np.array_equal(moments.gram, gram)
+    assert np.array_equal(moments.dense_noise, noise)
+    for joint in range(3):
+        columns, squares = moments.of_joint(joint)
+        assert np.array_equal(columns, np.flatnonzero(gram[:, joint, :-1, -1].any(axis=0)))
+        assert squares.shape == (4, len(columns) + 1, len(columns) + 1)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds, st.permutations(range(6)), st.integers(0, 6))
+def test_a_smaller_model_is_read_off_a_larger_one(seed, order, size):
+    moments, gram, noise = draw_sparse(seed)
+    chosen = np.array(order[:size], dtype=int)
+    places = np.append(chosen, 6)
+    smaller = moments.select_columns(chosen)
+    assert smaller.columns == tuple("abcdef"[k] for k in chosen)
+    assert np.array_equal(smaller.gram, gram[:, :, places[:, None], places])
+    assert np.array_equal(smaller.dense_noise, noise[:, :, places[:, None], places])
+    assert smaller.noise_error == moments.noise_error
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds)
+def test_sums_over_blocks_and_joints_are_those_of_all_columns(seed):
+    moments, gram, noise = draw_sparse(seed)
+    weights = np.random.default_rng(seed).uniform(0.1, 3.0, 3)
+    wanted, added = (np.einsum("j,bjmn->bmn", weights, sums) for sums in (gram, noise))
+    assert np.allclose(list(moments.by_block(weights)), wanted)
+    assert np.allclose(moments.pooled(weights).xx, wanted.sum(axis=0)[:-1, :-1])
+    assert np.allclose(moments.pooled(weights).xy, wanted.sum(axis=0)[:-1, -1])
+    assert np.allclose(moments.pooled_noise(weights), added.sum(axis=0))
+    folds = moments.merged_blocks([[0, 2], [3], np.arange(4) < 2])
+    assert np.allclose(folds.gram, [gram[[0, 2]].sum(axis=0), gram[3], gram[:2].sum(axis=0)])
+    assert np.array_equal(folds.count[0], moments.count[0] + moments.count[2])
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds, seeds)
+def test_joints_with_other_columns_add_as_well(one, other):
+    (first, gram, noise), (second, more, louder) = draw_sparse(one), draw_sparse(other)
+    both = first + second
+    assert np.array_equal(both.gram, np.concatenate([gram, more]))
+    assert np.array_equal(both.dense_noise, np.concatenate([noise, louder]))
+
+
+@pytest.mark.parametrize("columns", [[0, 0], [6], [-1], [[0, 1]]])
+def test_columns_that_are_not_there_cannot_be_selected(columns):
+    with pytest.raises(ParameterError, match=r"wanted distinct columns among 0 \.\. 5"):
+        draw_sparse(0)[0].select_columns(columns)
+
+
+def test_columns_of_a_row_ascend():
+    with pytest.raises(ParameterError, match="must ascend"):
+        Moments((np.ones((1, 3, 3)),), (np.array([1, 0]),), np.ones((1, 1)), ("a", "b"), ("j",))
+    with pytest.raises(ParameterError, match=r"squares of j must have shape \(1, 2, 2\)"):
+        Moments((np.ones((1, 3, 3)),), (np.array([1]),), np.ones((1, 1)), ("a", "b"), ("j",))
+
+
 def test_weights_multiply_the_rows_of_their_joint():
     x, y = draw_rows(0)
     one = Moments.from_rows(x, y)
-    two = Moments(np.concatenate([one.gram, 4 * one.gram], axis=1), np.tile(one.count, 2), one.columns, ("a", "b"))
+    two = Moments.from_dense(
+        np.concatenate([one.gram, 4 * one.gram], axis=1), np.tile(one.count, 2), one.columns, ("a", "b")
+    )
     assert np.allclose(two.pooled([1.0, 0.25]).xx, 2 * one.pooled().xx)
 
 
 def test_arrays_are_copies_and_read_only():
     gram = np.eye(3)[None, None].copy()
-    moments = Moments(gram, np.ones((1, 1)), ("a", "b"), ("j",))
+    moments = Moments.from_dense(gram, np.ones((1, 1)), ("a", "b"), ("j",))
     gram[:] = 7
     assert np.array_equal(moments.gram[0, 0], np.eye(3))
     with pytest.raises(ValueError, match="read-only"):
@@ -78,7 +157,7 @@ def test_arrays_are_copies_and_read_only():
 )
 def test_wrong_shapes_are_named(gram, count, message):
     with pytest.raises(ParameterError, match=message):
-        Moments(gram, count, ("a", "b"), ("j",))
+        Moments.from_dense(gram, count, ("a", "b"), ("j",))
 
 
 def test_only_like_moments_add():
@@ -96,6 +175,22 @@ def test_moments_on_disk_are_read_back_as_one_block(tmp_path):
     np.testing.assert_allclose(back.pooled().xx, moments.pooled().xx)
     assert back.pooled().count == moments.pooled().count
     assert [path.name for path in tmp_path.iterdir()] == ["moments.npz"]
+
+
+def test_moments_on_disk_keep_every_joints_own_columns(tmp_path):
+    moments, gram, _ = draw_sparse(1)
+    write_moments(moments, tmp_path / "moments.npz")
+    back = read_moments(tmp_path / "moments.npz")
+    assert back.noise is None
+    assert all(map(np.array_equal, back.row_columns, moments.row_columns))
+    assert np.array_equal(back.gram[0], gram.sum(axis=0))
+
+
+def test_moments_of_the_first_version_are_read(tmp_path):
+    moments, gram, _ = draw_sparse(2)
+    sums = {"gram": gram[:1], "count": moments.count[:1]}
+    np.savez(tmp_path / "moments.npz", **sums, columns=list(moments.columns), joints=list(moments.joints))
+    assert np.array_equal(read_moments(tmp_path / "moments.npz").gram, gram[:1])
 
 
 @pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04 cut off"])

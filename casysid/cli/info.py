@@ -24,7 +24,7 @@ def info(
         from rich.console import Console
 
         from casysid.cli.console import rich_table
-        from casysid.recording import read_recording
+        from casysid.recording import open_recording
         from casysid.report.overview import recording_tables, robot_tables
 
         model = load_robot(robot, gravity, lock, floating_base)
@@ -32,7 +32,7 @@ def info(
         console.print(f"[bold]{model.name}[/]  {model.source}", highlight=False)
         tables = robot_tables(model)
         if log is not None:
-            tables += recording_tables(model, read_recording(log, model))
+            tables += recording_tables(model, open_recording(log, model))
         for title, table in tables:
             console.print(rich_table(title, table.header, table.rows))
             console.print()

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
+from casysid.arrays import Array
 from casysid.dynamics import symbolic
 from casysid.dynamics.friction import (
     Coupling,
     Direction,
-    FrictionColumn,
-    SmoothSign,
+    DriveState,
+    FrictionKind,
     coupling_direction,
     joint_directions,
 )
-from casysid.dynamics.friction_kinds import LoadedCoulomb
 from casysid.dynamics.joints import constant
 from casysid.errors import ParameterError
 from casysid.robot import JointKind, Robot
@@ -30,7 +32,7 @@ class Parameter:
     Attributes:
         name: ``<owner>.<kind>``.
         owner: A link, a degree of freedom, or a coupling.
-        kind: ``m`` ... ``Izz``, or the friction column's kind.
+        kind: ``m`` ... ``Izz``, or the name of the friction's term, which is that of its kind if it has only one.
         unit: In SI.
         non_negative: Whether it cannot be negative.
         prior: The model file's value.
@@ -44,75 +46,128 @@ class Parameter:
     prior: float
 
 
-def drive_columns(
-    column_along: ColumnMaker, friction: Sequence[FrictionColumn], couplings: Sequence[Coupling]
-) -> Iterator[tuple[Parameter, Any]]:
-    """Every friction column with its parameter: kind by kind for the joints, then coupling by coupling."""
-    robot, state = column_along.robot, column_along.state
+@dataclass(frozen=True, eq=False)
+class FrictionPart:
+    """One kind of friction along one direction, in a regressor.
+
+    Attributes:
+        kind: Of friction.
+        direction: Where it acts.
+        columns: Of its terms.
+    """
+
+    kind: FrictionKind
+    direction: Direction
+    columns: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SymbolicPart:
+    """One kind of friction along one direction, as expressions.
+
+    Attributes:
+        kind: Of friction.
+        direction: Where it acts.
+        parameters: Of its terms.
+        torques: Of all joints for parameters of one, expressions of shape (nv, terms).
+        numbers: Symbols that stand for the kind's numbers, (n,).
+        histories: Symbols that stand for its histories, (m,).
+    """
+
+    kind: FrictionKind
+    direction: Direction
+    parameters: tuple[Parameter, ...]
+    torques: Any
+    numbers: Any
+    histories: Any
+
+
+def drive_parts(
+    part_along: PartMaker, friction: Sequence[FrictionKind], couplings: Sequence[Coupling]
+) -> Iterator[SymbolicPart]:
+    """All friction with its parameters: kind by kind for the joints, then coupling by coupling."""
+    robot = part_along.robot
     joints = joint_directions(robot)
-    ordinary = [
-        column_along(column, direction, column.prior(robot, dof))
-        for column in friction
-        for dof, direction in joints.items()
-    ]
-    coupled = [
-        column_along(column, coupling_direction(robot, coupling), 0.0)
-        for coupling in couplings
-        for column in friction
-        if coupling.kinds is None or column.kind in coupling.kinds
-    ]
-    yield from (entry for entry in ordinary if entry is not None)
-    moving = ca.vertcat(state.q, state.v, state.a)
-    yield from (entry for entry in coupled if entry is not None and ca.depends_on(entry[1], moving))
+    for kind in friction:
+        for dof, direction in joints.items():
+            yield from part_along(kind, direction, kind.prior(robot, dof))
+    for coupling in couplings:
+        direction = coupling_direction(robot, coupling)
+        for kind in friction:
+            if coupling.kinds is None or kind.kind in coupling.kinds:
+                yield from part_along(kind, direction, constant_too=False)
 
 
-class ColumnMaker:
+class PartMaker:
     """Makes columns of friction along directions, on one state's symbols.
 
     Attributes:
         robot: Whose columns.
         state: Its symbols.
-        signs: Kind and direction of every smooth sign made so far, with the symbol that stands for its width.
     """
 
     def __init__(self, robot: Robot, state: symbolic.State) -> None:
         self.robot, self.state = robot, state
-        self.signs: list[tuple[str, Direction, Any]] = []
         self._positions, self._missing = _positions(robot, state)
-        self._loads: dict[tuple[float, ...] | None, Any] = {}
+        self._loads: dict[bytes, Any] = {}
 
-    def __call__(self, column: FrictionColumn, direction: Direction, prior: float) -> tuple[Parameter, Any] | None:
-        """The column's parameter and its torque (nv,); None where it does not act."""
+    def __call__(
+        self, kind: FrictionKind, direction: Direction, prior: float = 0.0, *, constant_too: bool = True
+    ) -> Iterator[SymbolicPart]:
+        """The kind's terms along a direction; nothing where it has none.
+
+        Args:
+            kind: Of friction.
+            direction: Where it acts.
+            prior: The model file's value of its parameters.
+            constant_too: Whether terms that no motion changes are wanted.
+
+        Raises:
+            ParameterError: A term uses the position of a degree of freedom that has none.
+        """
         weights, state = constant(direction.weights), self.state
-        if isinstance(column, SmoothSign):
-            direction = replace(direction, width=ca.SX.sym("width"))
-        if isinstance(column, LoadedCoulomb):
-            direction = replace(direction, load=weights.T @ self._load(column))
         s, ds, dds = (weights.T @ x for x in (self._positions, state.v, state.a))
-        expression = column.torque(direction, s, ds, dds)
-        if expression is None:
-            return None
-        torque = ca.SX(expression)
-        if ca.depends_on(torque, self._missing):
-            raise ParameterError(
-                f"friction: '{column.kind}' uses the position of '{direction.name}', which has none; return None there"
-            )
-        if direction.width is not None:
-            self.signs.append((column.kind, replace(direction, width=None, load=None), direction.width))
-        name, unit = f"{direction.name}.{column.kind}", column.unit(direction)
-        parameter = Parameter(name, direction.name, column.kind, unit, column.non_negative, prior)
-        return parameter, weights @ torque
+        numbers = ca.SX.sym("numbers", len(kind.with_open_numbers().numbers(direction)))
+        histories = ca.SX.sym("history", len(kind.histories(direction)))
+        load = partial(self._static_torque, kind, weights)
+        along = DriveState(
+            position=s,
+            velocity=ds,
+            acceleration=dds,
+            numbers=tuple(ca.vertsplit(numbers)),
+            histories=tuple(ca.vertsplit(histories)),
+            robot=(state.q, state.v, state.a),
+            static_torque=load,
+        )
+        torques, parameters, moving = [], [], ca.vertcat(state.q, state.v, state.a, histories)
+        for term in kind.terms(direction, along):
+            torque = ca.SX(term.torque)
+            if ca.depends_on(torque, self._missing):
+                raise ParameterError(
+                    f"friction: '{kind.kind}' uses the position of '{direction.name}', which has none; "
+                    "it cannot act there"
+                )
+            if constant_too or ca.depends_on(torque, moving):
+                torques.append(weights @ torque)
+                name = f"{direction.name}.{term.name}"
+                parameters.append(Parameter(name, direction.name, term.name, term.unit, term.non_negative, prior))
+        if parameters:
+            yield SymbolicPart(kind, direction, tuple(parameters), ca.horzcat(*torques), numbers, histories)
 
-    def _load(self, column: LoadedCoulomb) -> Any:
-        """Torques (nv,) that hold the column's model still."""
-        key = column.inertial_parameters
+    def _static_torque(self, kind: FrictionKind, weights: Any, parameters: Array | None) -> Any:
+        """What gravity asks along a direction of links with some parameters, (10 links,)."""
+        own = self.robot.inertial_parameters
+        theta = own if parameters is None else parameters
+        if theta.shape != own.shape:
+            raise ParameterError(
+                f"{kind.kind} friction: inertial_parameters must be {own.size} numbers; got {theta.size}"
+            )
+        key = theta.tobytes()
         if key not in self._loads:
             still = symbolic.State(self.state.q, ca.SX(self.robot.nv, 1), ca.SX(self.robot.nv, 1))
-            parameters = constant(column.model(self.robot.inertial_parameters))
-            self._loads[key] = symbolic.inverse_dynamics(
-                self.robot, symbolic.link_motions(self.robot, still), parameters
-            )
-        return self._loads[key]
+            motions = symbolic.link_motions(self.robot, still)
+            self._loads[key] = symbolic.inverse_dynamics(self.robot, motions, constant(theta))
+        return weights.T @ self._loads[key]
 
 
 def _positions(robot: Robot, state: symbolic.State) -> tuple[Any, Any]:
@@ -127,3 +182,19 @@ def _positions(robot: Robot, state: symbolic.State) -> tuple[Any, Any]:
                 cosine, sine = ca.vertsplit(state.q[joint.q])
                 positions[joint.v] = ca.atan2(sine, cosine)
     return positions, missing
+
+
+def continued_positions(robot: Robot, q: Array) -> Array:
+    """The coordinate of each degree of freedom, shape (N, nv), from configurations (N, nq) in order of time.
+
+    Angles of joints that turn without end go on beyond a turn; where there is no coordinate it is zero.
+    """
+    positions = np.zeros((len(q), robot.nv))
+    for joint in robot.joints:
+        match joint.kind:
+            case JointKind.REVOLUTE | JointKind.PRISMATIC:
+                positions[:, joint.v] = q[:, joint.q]
+            case JointKind.CONTINUOUS:
+                cosine, sine = q[:, joint.q].T
+                positions[:, joint.v.start] = np.unwrap(np.arctan2(sine, cosine))
+    return positions

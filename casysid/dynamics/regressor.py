@@ -15,8 +15,8 @@ import numpy.typing as npt
 from casysid.arrays import Array, frozen
 from casysid.dynamics import symbolic
 from casysid.dynamics.bulk import Bulk
-from casysid.dynamics.drive import ColumnMaker, Parameter
-from casysid.dynamics.friction import DEFAULT_FRICTION, Coupling, Direction, FrictionColumn, SmoothSign
+from casysid.dynamics.drive import FrictionPart, Parameter, PartMaker, continued_positions
+from casysid.dynamics.friction import DEFAULT_FRICTION, Coupling, Direction, FrictionKind, Law
 from casysid.dynamics.joints import constant
 from casysid.dynamics.template import Template, build_template, finish_template
 from casysid.errors import ParameterError
@@ -28,15 +28,17 @@ class Regressor:
     """``tau = Y(q, v, a) θ``, for one robot with its friction.
 
     Attributes:
-        template: What this regressor is with its smooth signs' widths left open.
-        widths: Of the smooth signs, in the order of ``template.signs``.
-        friction: Kinds of friction in it.
+        template: What this regressor is with its friction's numbers left open.
+        numbers: Those, in the order of ``template.parts``.
+        parts: Friction in it, in the order of its columns.
+        friction: Kinds of friction that every joint was given.
         couplings: Transmissions in it.
     """
 
     template: Template
-    widths: Array
-    friction: tuple[FrictionColumn, ...] = ()
+    numbers: Array
+    parts: tuple[FrictionPart, ...]
+    friction: tuple[FrictionKind, ...] = ()
     couplings: tuple[Coupling, ...] = ()
 
     @property
@@ -59,49 +61,106 @@ class Regressor:
         """The model file's parameters, shape (p,)."""
         return frozen([parameter.prior for parameter in self.parameters])
 
+    @cached_property
+    def friction_laws(self) -> tuple[Law, ...]:
+        """What friction's parameters obey beside the signs of each."""
+        beside: dict[str, dict[str, str]] = {}
+        for part in self.parts:
+            for column in part.columns:
+                beside.setdefault(part.direction.name, {}).setdefault(self.parameters[column].kind, self.names[column])
+        return tuple(
+            law
+            for part in self.parts
+            for law in part.kind.laws([self.names[column] for column in part.columns], beside[part.direction.name])
+        )
+
     @property
     def row_columns(self) -> tuple[npt.NDArray[np.intp], ...]:
         """For each degree of freedom, the columns that are structurally nonzero in its row of ``Y``."""
         return self.template.row_columns
 
     @cached_property
+    def history_count(self) -> int:
+        """How many signals of the motion before it asks for."""
+        return int(self.template.function.nnz_in("histories"))
+
+    @cached_property
     def function(self) -> Any:
-        """``casadi.Function`` ``(q, v, a) -> Y``, sparse, shape (nv, p)."""
-        state = symbolic.State.of(self.robot)
-        inputs = [state.q, state.v, state.a]
-        Y = self.template.function(*inputs, constant(self.widths))
-        return ca.Function("regressor", inputs, [Y], ["q", "v", "a"], ["Y"], {"cse": True})
+        """``casadi.Function`` ``(q, v, a) -> Y``, sparse, shape (nv, p); with histories, if any, as last input."""
+        state, histories = symbolic.State.of(self.robot), self._history_symbols
+        inputs = [state.q, state.v, state.a, *histories]
+        Y = self.template.function(*inputs, *([] if histories else [ca.SX(0, 1)]), constant(self.numbers))
+        names = ["q", "v", "a", "histories"][: len(inputs)]
+        return ca.Function("regressor", inputs, [Y], names, ["Y"], {"cse": True})
 
     @cached_property
     def torque(self) -> Any:
-        """``casadi.Function`` ``(q, v, a, parameters) -> tau``, which is ``Y θ`` in fewer operations."""
-        state, theta = symbolic.State.of(self.robot), ca.SX.sym("parameters", len(self.parameters))
-        inputs = [state.q, state.v, state.a, theta]
-        tau = self.template.torque(*inputs, constant(self.widths))
-        return ca.Function("torque", inputs, [tau], ["q", "v", "a", "parameters"], ["tau"], {"cse": True})
+        """``casadi.Function`` ``(q, v, a, parameters) -> tau``: ``Y θ`` in fewer operations; histories as there."""
+        state, histories = symbolic.State.of(self.robot), self._history_symbols
+        inputs = [state.q, state.v, state.a, ca.SX.sym("parameters", len(self.parameters)), *histories]
+        tau = self.template.torque(*inputs, *([] if histories else [ca.SX(0, 1)]), constant(self.numbers))
+        names = ["q", "v", "a", "parameters", "histories"][: len(inputs)]
+        return ca.Function("torque", inputs, [tau], names, ["tau"], {"cse": True})
+
+    @property
+    def _history_symbols(self) -> list[Any]:
+        return [ca.SX.sym("histories", self.history_count)] if self.history_count else []
 
     @property
     def equations(self) -> Bulk:
-        """Bulk evaluation of ``(q, v, a, tau)`` -> for each degree of freedom its row's nonzeros, then its torque.
+        """Bulk evaluation of ``(q, v, a, tau)``, with :meth:`histories` as a fifth input where there are any.
 
-        The entries of row ``i`` belong to the columns ``row_columns[i]``.
+        Gives for each degree of freedom its row's nonzeros, then its torque; the entries of row ``i`` belong to the
+        columns ``row_columns[i]``.
         """
-        return self.template.equations.given(self.widths)
+        return self._settled(self.template.equations)
 
-    def evaluate(self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike) -> Array:
+    def _settled(self, bulk: Bulk) -> Bulk:
+        return bulk.given(*([] if self.history_count else [np.zeros(0)]), self.numbers)
+
+    def histories(self, q: npt.ArrayLike, time: npt.ArrayLike | None = None) -> tuple[Array, ...]:
+        """What friction remembers at every sample, as one input of shape (N, m) more; nothing if it remembers nothing.
+
+        Args:
+            q: Configurations in order of time, shape (N, nq).
+            time: [s], shape (N,); None numbers the samples.
+
+        Raises:
+            ParameterError: A shape does not fit.
+        """
+        if not self.history_count:
+            return ()
+        rows = np.asarray(q, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != self.robot.nq:
+            raise ParameterError(
+                f"friction: what remembers needs q of many samples, (N, {self.robot.nq}); got {rows.shape}"
+            )
+        at = np.arange(len(rows), dtype=np.float64) if time is None else np.asarray(time, dtype=np.float64)
+        positions = continued_positions(self.robot, rows)
+        signals = [
+            history.values(at, positions @ part.direction.weights)
+            for part in self.parts
+            for history in part.kind.histories(part.direction)
+        ]
+        return (np.stack(signals, axis=1),)
+
+    def evaluate(
+        self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike, *, time: npt.ArrayLike | None = None
+    ) -> Array:
         """``Y`` at every sample, dense, shape (N, nv, p): 8 N nv p bytes.
 
         Args:
             q: Configurations, shape (N, nq).
             v: Velocities, shape (N, nv).
             a: Accelerations, shape (N, nv).
+            time: As for :meth:`histories`.
 
         Raises:
             ParameterError: When a shape does not fit.
         """
         nv, p = self.robot.nv, len(self.parameters)
         rows = self.equations
-        inputs, samples = rows.check((q, v, a, np.zeros(nv)))
+        inputs, samples = rows.check((q, v, a, np.zeros(nv), *self.histories(q, time)))
         out = np.zeros((samples, nv * p))
         places = np.concatenate([np.append(dof * p + columns, -1) for dof, columns in enumerate(self.row_columns)])
         filled = places >= 0  # without the torques
@@ -112,7 +171,15 @@ class Regressor:
         deque(rows.map(keep, inputs, [np.arange(samples)], threads=2), maxlen=0)
         return out.reshape(samples, nv, p)
 
-    def predict(self, parameters: npt.ArrayLike, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike) -> Array:
+    def predict(
+        self,
+        parameters: npt.ArrayLike,
+        q: npt.ArrayLike,
+        v: npt.ArrayLike,
+        a: npt.ArrayLike,
+        *,
+        time: npt.ArrayLike | None = None,
+    ) -> Array:
         """Torques at every sample, shape (N, nv), in memory of that size.
 
         Args:
@@ -120,16 +187,17 @@ class Regressor:
             q: Configurations, shape (N, nq).
             v: Velocities, shape (N, nv).
             a: Accelerations, shape (N, nv).
+            time: As for :meth:`histories`.
 
         Raises:
             ParameterError: When a shape does not fit.
         """
-        return self.template.torques.given(self.widths).evaluate(q, v, a, parameters)
+        return self._settled(self.template.torques).evaluate(q, v, a, parameters, *self.histories(q, time))
 
 
 def build_regressor(
     robot: Robot,
-    friction: Sequence[FrictionColumn] = DEFAULT_FRICTION,
+    friction: Sequence[FrictionKind] = DEFAULT_FRICTION,
     couplings: Sequence[Coupling] = (),
     *,
     quasi_static: bool = False,
@@ -139,8 +207,8 @@ def build_regressor(
 
     Args:
         robot: Its links give ten columns each.
-        friction: Columns of every driven degree of freedom, and of every coupling as far as they depend on motion
-            there (a coupling's constant torque is a sum of its joints' constant torques).
+        friction: Kinds that act on every driven degree of freedom, and on every coupling as far as motion changes them
+            (a coupling's constant torque is a sum of its joints' constant torques).
         couplings: Motors that act on several joints.
         quasi_static: Torques hold gravity and friction, but nothing inertial: for links velocity and acceleration, for
             drives acceleration count as zero.
@@ -159,34 +227,48 @@ def build_regressor(
     if len(set(kinds)) != len(kinds) or len(set(coupled)) != len(coupled):
         raise ParameterError(f"friction: every kind and every coupling once; got {kinds} and {coupled}")
     template = build_template(robot, friction, couplings, quasi_static, gains.tolist())
+    by_name = {kind.kind: kind for kind in friction}
+    parts = tuple(replace(part, kind=by_name[part.kind.kind]) for part in template.parts)
     return Regressor(
-        template=template, widths=template.widths(friction), friction=tuple(friction), couplings=tuple(couplings)
+        template=template,
+        numbers=_numbers(parts),
+        parts=parts,
+        friction=tuple(friction),
+        couplings=tuple(couplings),
     )
 
 
-def extend_regressor(regressor: Regressor, columns: Sequence[tuple[FrictionColumn, Direction]]) -> Regressor:
-    """A regressor with further columns, each along one direction, named by their place so that kinds may repeat.
+def extend_regressor(regressor: Regressor, additions: Sequence[tuple[FrictionKind, Direction]]) -> Regressor:
+    """A regressor with further friction, each along one direction, named by its place so that kinds may repeat.
 
     Raises:
-        ParameterError: A column is not there along its direction, or uses a position that is none.
+        ParameterError: A kind does not act along its direction, or uses a position that is none.
     """
     robot, state = regressor.robot, symbolic.State.of(regressor.robot)
-    column_along = ColumnMaker(robot, state)
-    extra = [column_along(column, direction, 0.0) for column, direction in columns]
-    missing = [
-        f"{column.kind} of {direction.name}" for (column, direction), e in zip(columns, extra, strict=True) if e is None
-    ]
+    part_along = PartMaker(robot, state)
+    found = [(kind, direction, next(part_along(kind, direction), None)) for kind, direction in additions]
+    missing = [f"{kind.kind} of {direction.name}" for kind, direction, part in found if part is None]
     if missing:
         raise ParameterError(f"friction: no column for {', '.join(missing)}")
-    found = [entry for entry in extra if entry is not None]
+    extra = [part for _, _, part in found if part is not None]
     parameters = (
         *regressor.parameters,
-        *(replace(parameter, name=f"{parameter.name} #{k}") for k, (parameter, _) in enumerate(found)),
+        *(
+            replace(parameter, name=f"{parameter.name} #{k}")
+            for k, part in enumerate(extra)
+            for parameter in part.parameters
+        ),
     )
-    matrix = ca.horzcat(ca.SX(robot.nv, 0), *(torque for _, torque in found))
+    matrix = ca.horzcat(ca.SX(robot.nv, 0), *(part.torques for part in extra))
     theta, p = ca.SX.sym("parameters", len(parameters)), len(regressor.parameters)
-    inputs = (state.q, state.v, state.a)
-    Y, tau = ca.horzcat(regressor.function(*inputs), matrix), regressor.torque(*inputs, theta[:p]) + matrix @ theta[p:]
-    template = finish_template(robot, state, parameters, Y, theta, tau, column_along.signs)
-    smooth = [(column, direction) for column, direction in columns if isinstance(column, SmoothSign)]
-    return Regressor(template=template, widths=frozen([column.width_at(direction) for column, direction in smooth]))
+    inputs, known = (state.q, state.v, state.a), ca.SX.sym("histories", regressor.history_count)
+    earlier = [known] if regressor.history_count else []
+    Y = ca.horzcat(regressor.function(*inputs, *earlier), matrix)
+    tau = regressor.torque(*inputs, theta[:p], *earlier) + matrix @ theta[p:]
+    template = finish_template(robot, state, parameters, Y, theta, tau, extra, known)
+    return Regressor(template=template, numbers=_numbers(template.parts), parts=(*regressor.parts, *template.parts))
+
+
+def _numbers(parts: Sequence[FrictionPart]) -> Array:
+    """What enters nonlinearly, in the order of the parts."""
+    return frozen([number for part in parts for number in part.kind.numbers(part.direction)])

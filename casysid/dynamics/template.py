@@ -1,4 +1,4 @@
-"""What the regressors of one robot share that differ in nothing but how sharply friction changes its sign.
+"""What the regressors of one robot share that differ in nothing but the numbers that their friction leaves open.
 
 A search over widths of smooth signs makes many regressors. The widths are inputs of the functions here, so that the
 mechanism's algebra is done, and its code compiled, only once.
@@ -7,19 +7,19 @@ mechanism's algebra is done, and its code compiled, only once.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import islice
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from casysid.arrays import Array, frozen
 from casysid.dynamics import symbolic
 from casysid.dynamics.bulk import Bulk
-from casysid.dynamics.drive import ColumnMaker, Parameter, drive_columns
-from casysid.dynamics.friction import Coupling, Direction, FrictionColumn, SmoothSign
+from casysid.dynamics.drive import FrictionPart, Parameter, PartMaker, SymbolicPart, drive_parts
+from casysid.dynamics.friction import Coupling, FrictionKind
 from casysid.dynamics.joints import constant
 from casysid.robot import Robot
 
@@ -34,21 +34,21 @@ KEPT = 4
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Template:
-    """``tau = Y(q, v, a; widths) θ``.
+    """``tau = Y(q, v, a, histories; numbers) θ``.
 
     Attributes:
         robot: Whose torques these are.
         parameters: What the p columns multiply.
-        function: ``casadi.Function`` ``(q, v, a, widths) -> Y``, sparse, shape (nv, p).
-        torque: ``casadi.Function`` ``(q, v, a, parameters, widths) -> tau``.
-        signs: Kind of friction and direction of every smooth sign whose width is an input.
+        function: ``casadi.Function`` ``(q, v, a, histories, numbers) -> Y``, sparse, shape (nv, p).
+        torque: ``casadi.Function`` ``(q, v, a, parameters, histories, numbers) -> tau``.
+        parts: Friction whose open numbers are the last input, in the order of its columns.
     """
 
     robot: Robot
     parameters: tuple[Parameter, ...]
     function: Any
     torque: Any
-    signs: tuple[tuple[str, Direction], ...] = ()
+    parts: tuple[FrictionPart, ...] = ()
 
     @cached_property
     def row_columns(self) -> tuple[npt.NDArray[np.intp], ...]:
@@ -58,51 +58,43 @@ class Template:
 
     @cached_property
     def equations(self) -> Bulk:
-        """``(q, v, a, tau, widths)`` -> for each degree of freedom its row's nonzeros, then its torque."""
+        """``(q, v, a, tau, histories, numbers)`` -> for each degree of freedom its row's nonzeros, then its torque."""
         state, tau = symbolic.State.of(self.robot), ca.SX.sym("tau", self.robot.nv)
-        widths = ca.SX.sym("widths", len(self.signs))
-        Y = self.function(state.q, state.v, state.a, widths)
+        numbers = ca.SX.sym("numbers", self.function.nnz_in("numbers"))
+        histories = ca.SX.sym("histories", self.function.nnz_in("histories"))
+        Y = self.function(state.q, state.v, state.a, histories, numbers)
         entries = [
             entry
             for dof, columns in enumerate(self.row_columns)
             for entry in (*(Y[dof, int(column)] for column in columns), tau[dof])
         ]
-        inputs = [state.q, state.v, state.a, tau, widths]
-        names = ["q", "v", "a", "tau", "widths"]
+        inputs = [state.q, state.v, state.a, tau, histories, numbers]
+        names = ["q", "v", "a", "tau", "histories", "numbers"]
         return Bulk(ca.Function("equations", inputs, [ca.vertcat(*entries)], names, ["rows"], {"cse": True}))
 
     @cached_property
     def torques(self) -> Bulk:
-        """``(q, v, a, parameters, widths) -> tau``."""
+        """``(q, v, a, parameters, histories, numbers) -> tau``."""
         return Bulk(self.torque)
-
-    def widths(self, friction: Sequence[FrictionColumn]) -> Array:
-        """The widths of some friction's smooth signs, in the order of the input.
-
-        Raises:
-            ParameterError: A width is missing.
-        """
-        smooth = {column.kind: column for column in friction if isinstance(column, SmoothSign)}
-        return frozen([smooth[kind].width_at(direction) for kind, direction in self.signs])
 
 
 def build_template(
     robot: Robot,
-    friction: Sequence[FrictionColumn],
+    friction: Sequence[FrictionKind],
     couplings: Sequence[Coupling],
     quasi_static: bool,
     gains: Sequence[float],
 ) -> Template:
-    """The template for some friction, whatever its widths; arguments as :func:`~casysid.dynamics.build_regressor`.
+    """The template for some friction, whatever its numbers; arguments as :func:`~casysid.dynamics.build_regressor`.
 
     Raises:
         ParameterError: A coupling names an unknown joint, or a column uses a position that is none.
     """
-    widthless = tuple(replace(column, width=1.0) if isinstance(column, SmoothSign) else column for column in friction)
-    arguments = robot, widthless, tuple(couplings), quasi_static, tuple(gains)
+    numberless = tuple(kind.with_open_numbers() for kind in friction)
+    arguments = robot, numberless, tuple(couplings), quasi_static, tuple(gains)
     try:
         return _kept(*arguments)
-    except TypeError:  # a column holds what cannot be hashed, such as a velocity for each joint's name
+    except TypeError:  # a kind holds what cannot be hashed, such as a velocity for each joint's name
         return _build(*arguments)
 
 
@@ -113,48 +105,61 @@ def finish_template(
     Y: Any,
     theta: Any,
     tau: Any,
-    signs: Sequence[tuple[str, Direction, Any]] = (),
+    parts: Sequence[SymbolicPart],
+    histories: Any,
 ) -> Template:
-    """The functions of expressions for ``Y`` and ``tau`` in a state, ``theta`` and the symbols of the signs' widths."""
+    """The functions of expressions for ``Y`` and ``tau`` in a state, ``theta`` and the parts' open numbers.
+
+    The parts' columns and histories are the last ones.
+    """
     inputs, names = [state.q, state.v, state.a], ["q", "v", "a"]
-    widths = ca.vertcat(ca.SX(0, 1), *(width for _, _, width in signs))
+    numbers = ca.vertcat(ca.SX(0, 1), *(part.numbers for part in parts))
+    histories = ca.vertcat(histories, *(part.histories for part in parts))
+    columns = iter(range(len(parameters) - sum(len(part.parameters) for part in parts), len(parameters)))
     return Template(
         robot=robot,
         parameters=parameters,
         function=ca.Function(
-            "regressor", [*inputs, widths], [ca.sparsify(Y)], [*names, "widths"], ["Y"], {"cse": True}
+            "regressor",
+            [*inputs, histories, numbers],
+            [ca.sparsify(Y)],
+            [*names, "histories", "numbers"],
+            ["Y"],
+            {"cse": True},
         ),
         torque=ca.Function(
             "torque",
-            [*inputs, theta, widths],
+            [*inputs, theta, histories, numbers],
             [ca.densify(tau)],
-            [*names, "parameters", "widths"],
+            [*names, "parameters", "histories", "numbers"],
             ["tau"],
             {"cse": True},
         ),
-        signs=tuple((kind, direction) for kind, direction, _ in signs),
+        parts=tuple(
+            FrictionPart(part.kind, part.direction, tuple(islice(columns, len(part.parameters)))) for part in parts
+        ),
     )
 
 
 def _build(
     robot: Robot,
-    friction: tuple[FrictionColumn, ...],
+    friction: tuple[FrictionKind, ...],
     couplings: tuple[Coupling, ...],
     quasi_static: bool,
     gains: tuple[float, ...],
 ) -> Template:
     state, still = symbolic.State.of(robot), ca.SX(robot.nv, 1)
     motions = symbolic.link_motions(robot, symbolic.State(state.q, still, still) if quasi_static else state)
-    column_along = ColumnMaker(robot, symbolic.State(state.q, state.v, still) if quasi_static else state)
-    drive = list(drive_columns(column_along, friction, couplings))
-    drive_matrix = ca.horzcat(ca.SX(robot.nv, 0), *(column for _, column in drive))
-    parameters = (*_inertial_parameters(robot), *(parameter for parameter, _ in drive))
+    part_along = PartMaker(robot, symbolic.State(state.q, state.v, still) if quasi_static else state)
+    parts = list(drive_parts(part_along, friction, couplings))
+    drive_matrix = ca.horzcat(ca.SX(robot.nv, 0), *(part.torques for part in parts))
+    parameters = (*_inertial_parameters(robot), *(parameter for part in parts for parameter in part.parameters))
     rigid = robot.inertial_parameters.size
     theta = ca.SX.sym("parameters", len(parameters))
     measured = ca.diag(constant(np.array(gains)))
     Y = measured @ ca.horzcat(symbolic.regressor(robot, motions), drive_matrix)
     tau = measured @ (symbolic.inverse_dynamics(robot, motions, theta[:rigid]) + drive_matrix @ theta[rigid:])
-    return finish_template(robot, state, parameters, Y, theta, tau, column_along.signs)
+    return finish_template(robot, state, parameters, Y, theta, tau, parts, ca.SX(0, 1))
 
 
 _kept = lru_cache(KEPT)(_build)

@@ -12,7 +12,8 @@ residuals have unit covariance.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -71,8 +72,7 @@ def covariance_from_blocks(moments: Moments, parameters: Array, weights: Array, 
     values, vectors = np.linalg.eigh(normal.xx * np.outer(inverse, inverse))
     known = values > RANK_TOLERANCE * max(values.max(initial=0.0), np.finfo(np.float64).tiny)
     W = inverse[:, None] * vectors[:, known] / np.sqrt(values[known])  # (p, r)
-    scores = _scores_of(moments, parameters, weights, W)
-    M, freedom = _covariance_of_scores(moments, scores, parameters, weights)
+    M, freedom = _covariance_of_scores(moments, parameters, weights, W)
     scale = np.where(live, inverse, inverse.max(initial=0.0) or 1.0)
     if prior is None or not known.any():
         return Spread.without_prior(W @ M @ W.T, vectors[:, ~known], scale, freedom)
@@ -129,82 +129,89 @@ def _prior_variance(strength: Array, solution: Array, noise: float) -> float:
     return max(spread, noise)
 
 
-@dataclass(frozen=True, eq=False)
-class _Scores:
-    """Scores of least squares and their share of the information, in directions of unit information.
-
-    Attributes:
-        information: ``L_bj``, shape (blocks, joints, r, r); they add to the unit matrix.
-        values: ``g_bj``, shape (blocks, joints, r); they add to zero.
-    """
-
-    information: Array
-    values: Array
-
-
-def _scores_of(moments: Moments, parameters: Array, weights: Array, W: Array) -> _Scores:
-    gram = weights[:, None, None] * moments.gram[:, :, :-1, :]
-    information = np.matmul(W.T, np.matmul(gram[..., :-1], W))
-    values = np.matmul(gram, np.append(-parameters, 1.0)) @ W
-    return _Scores(information, values - information @ values.sum(axis=(0, 1)))  # moved to the least squares
-
-
-def _covariance_of_scores(moments: Moments, scores: _Scores, parameters: Array, weights: Array) -> tuple[Array, float]:
-    """Covariance of the summed scores, shape (r, r), and its degrees of freedom.
+def _covariance_of_scores(moments: Moments, parameters: Array, weights: Array, W: Array) -> tuple[Array, float]:
+    """Covariance of the summed scores in directions ``W`` of unit information, (r, r), and its degrees of freedom.
 
     These are the blocks' own, as if nothing were pooled: what the pooled estimate gains in steadiness it may lose to
     directions that differ.
     """
-    rows, r = moments.count.sum(axis=0), scores.values.shape[2]
+    rows, r = moments.count.sum(axis=0), W.shape[1]
     freedom = np.maximum(rows * (1.0 - r / max(rows.sum(), r + 1.0)), 1.0)
     white = weights * moments.residual_energy(parameters).sum(axis=0) / freedom  # (joints,)
-    by_joint = scores.information.sum(axis=0)  # (joints, r, r)
     if moments.blocks < 2 or r == 0:
-        return np.einsum("j,jrs->rs", white, by_joint), np.inf
-    inflation = np.maximum(_inflation(scores), white)
-    pooled = np.einsum("j,jrs->rs", inflation, by_joint)
-    information, values = scores.information.sum(axis=1), scores.values.sum(axis=1)
-    direct, remembered = _direct(information, values, pooled)
-    share = np.einsum("brr->br", information)
-    own = np.maximum(1.0 / np.maximum((share**2).sum(axis=0), 1.0 / moments.blocks) - 1.0, 1.0)
+        return W.T @ moments.pooled(weights * white).xx @ W, np.inf
+    fitted = parameters + W @ (W.T @ moments.scores(parameters, weights).sum(axis=0))  # least squares: scores add to 0
+    inflation = np.maximum(_inflation(moments, fitted, weights, W @ W.T), white)
+    pooled = W.T @ moments.pooled(weights * inflation).xx @ W
+    direct, remembered, squared = _direct(moments, weights, W, moments.scores(fitted, weights) @ W, pooled)
+    own = np.maximum(1.0 / np.maximum(squared, 1.0 / moments.blocks) - 1.0, 1.0)
     prior = _prior_freedom(np.diag(direct) / np.diag(pooled), own)
     typical = float(np.mean(own))
     meat = (prior * pooled + typical * direct) / (prior + typical)
     return meat * remembered, typical
 
 
-def _inflation(scores: _Scores) -> Array:
+def _inflation(moments: Moments, fitted: Array, weights: Array, K: Array) -> Array:
     """``κ_j``: variance of each joint's residuals over that of white ones of variance ``1/w_j``, shape (joints,).
 
-    ``E |g_bj|² = κ_j (tr L_bj - 2 tr L_bj²) + Σ_i κ_i tr(L_bj L_i L_bj)``, a linear system.
+    With the shares ``L_bj`` of the information, scores ``g_bj`` in directions of unit information have
+    ``E |g_bj|² = κ_j (tr L_bj - 2 tr L_bj²) + Σ_i κ_i tr(L_bj L_i L_bj)``, a linear system. Joints are seen in their
+    own columns, where ``K = W Wᵀ``, (p, p), stands for the directions.
     """
-    L, total = scores.information, scores.information.sum(axis=0)
-    square = np.matmul(L, L).sum(axis=0)
-    system = np.einsum("jrs,isr->ji", square, total)
-    system[np.diag_indices_from(system)] += np.einsum("jrr->j", total) - 2.0 * np.einsum("jrr->j", square)
-    energy = np.einsum("bjr,bjr->j", scores.values, scores.values)
+    joints = range(len(weights))
+    rows = moments.row_columns
+    gram = [w * sums[:, :-1, :-1].sum(axis=0) for w, sums in zip(weights, moments.squares, strict=True)]
+    system, energy = np.empty((len(joints), len(joints))), np.empty(len(joints))
+    for j in joints:
+        own, blocks = K[np.ix_(rows[j], rows[j])], weights[j] * moments.squares[j][:, :-1]
+        square = sum(block @ own @ block for block in blocks[..., :-1])  # (w, w)
+        scores = blocks @ np.append(-fitted[rows[j]], 1.0)
+        energy[j] = np.einsum("bm,mn,bn->", scores, own, scores, optimize=True)
+        for i in joints:
+            across = K[np.ix_(rows[j], rows[i])]
+            system[j, i] = np.sum(square * (across @ gram[i] @ across.T))
+        system[j, j] += np.sum(gram[j] * own) - 2.0 * np.sum(square * own)
     return np.asarray(np.linalg.lstsq(system, energy, rcond=None)[0])
 
 
-def _direct(information: Array, values: Array, pooled: Array) -> tuple[Array, float]:
-    """Covariance from the blocks alone, shape (r, r), and the factor for what neighbouring blocks have in common.
+def _shares(moments: Moments, weights: Array, W: Array) -> Iterator[Array]:
+    """``L_b``, what each block has of the information in directions of unit information, shape (r, r)."""
+    for block in moments.by_block(weights):
+        yield W.T @ block[:-1, :-1] @ W
+
+
+def _direct(moments: Moments, weights: Array, W: Array, values: Array, pooled: Array) -> tuple[Array, float, Array]:
+    """Covariance from the blocks alone, and what else the blocks tell.
 
     Least squares takes from a block's scores what it can explain; ``(1 - L_b)^-½`` gives it back. What a block decides
     nearly alone cannot be given back, and is taken from the pooled estimate.
+
+    Args:
+        moments: The fitted moments.
+        weights: Row weights by joint, shape (joints,).
+        W: Directions of unit information, shape (p, r).
+        values: Scores of least squares in them by block, shape (blocks, r).
+        pooled: Covariance of the summed scores from the pooled estimate, shape (r, r).
+
+    Returns:
+        The covariance (r, r); the factor for what neighbouring blocks have in common; for each direction the sum of
+        the squared shares of the blocks, shape (r,).
     """
-    share, vectors = np.linalg.eigh(information)  # (blocks, r), (blocks, r, r)
-    share = np.clip(share, 0.0, 1.0)
-    left = np.maximum(1.0 - share, 1.0 - HEAVIEST_BLOCK)
-    across = np.swapaxes(vectors, 1, 2)
-    restored = (vectors @ (left[:, :, None] ** -0.5 * (across @ values[:, :, None])))[..., 0]
-    kept = (vectors * (share * (1.0 - share) / left)[:, None, :]) @ across
-    lost = np.eye(values.shape[1]) - kept.sum(axis=0)
+    kept, squared, restored = np.zeros_like(pooled), np.zeros(len(pooled)), np.empty_like(values)
+    for b, information in enumerate(_shares(moments, weights, W)):
+        share, vectors = np.linalg.eigh(information)
+        share = np.clip(share, 0.0, 1.0)
+        left = np.maximum(1.0 - share, 1.0 - HEAVIEST_BLOCK)
+        restored[b] = vectors @ (left**-0.5 * (vectors.T @ values[b]))
+        kept += (vectors * (share * (1.0 - share) / left)) @ vectors.T
+        squared += np.diag(information) ** 2
     size, axes = np.linalg.eigh(0.5 * (pooled + pooled.T))
     root = axes * np.sqrt(np.maximum(size, 0.0))  # denoised moments need not be positive definite
-    direct = restored.T @ restored + root @ _positive(lost) @ root.T
+    direct = restored.T @ restored + root @ _positive(np.eye(len(kept)) - kept) @ root.T
     common = float(np.sum(values[:-1] * values[1:]))
-    expected = -float(np.einsum("brs,bsr->", information[:-1], information[1:] @ direct))
-    return direct, max(1.0 + 2.0 * (common - expected) / max(float(np.trace(direct)), 1e-300), 1.0)
+    neighbours = pairwise(_shares(moments, weights, W))
+    expected = -sum(float(np.sum(one * (direct @ other))) for one, other in neighbours)
+    return direct, max(1.0 + 2.0 * (common - expected) / max(float(np.trace(direct)), 1e-300), 1.0), squared
 
 
 def _positive(matrix: Array) -> Array:

@@ -139,5 +139,6 @@ class DenoisingEstimator(ABC):
 
 def _pool_joints(moments: Moments, noise_std: Array) -> Moments:
     """All joints' rows divided by their noise, as if of one joint."""
-    gram = np.einsum("j,bjmn->bmn", noise_std**-2.0, moments.gram)[:, None]
-    return Moments(gram, moments.count.sum(axis=1, keepdims=True), moments.columns, ("pooled",))
+    squares = np.stack(list(moments.by_block(noise_std**-2.0)))
+    rows, count = np.arange(len(moments.columns)), moments.count.sum(axis=1, keepdims=True)
+    return Moments((squares,), (rows,), count, moments.columns, ("pooled",))

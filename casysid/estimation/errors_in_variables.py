@@ -103,7 +103,7 @@ def limit_noise(moments: Moments, margin: float) -> LimitedNoise:
     """
     assert moments.noise is not None
     weights = estimate_noise_std(moments) ** -2.0
-    gram, noise = (np.einsum("j,bjmn->mn", weights, sums)[:-1, :-1] for sums in (moments.gram, moments.noise))
+    gram, noise = moments.pooled(weights).xx, moments.pooled_noise(weights)[:-1, :-1]
     whitened = _unit_directions(gram)
     shares, turned = np.linalg.eigh(whitened.T @ noise @ whitened)
     excess = shares > margin
@@ -112,22 +112,26 @@ def limit_noise(moments: Moments, margin: float) -> LimitedNoise:
         return LimitedNoise(moments, heaviest, 0)
     W = whitened @ turned[:, excess]
     M = (W * (shares[excess] - margin)) @ W.T @ gram
-    product = moments.gram[..., :-1, :-1] @ M
-    limited = moments.noise.copy()
+    sums, limited = moments.gram, np.array(moments.dense_noise)
+    product = sums[..., :-1, :-1] @ M
     limited[..., :-1, :-1] -= 0.5 * (product + np.swapaxes(product, 2, 3))
-    return LimitedNoise(dataclasses.replace(moments, noise=limited), heaviest, int(excess.sum()))
+    dense = Moments.from_dense(
+        sums, moments.count, moments.columns, moments.joints, noise=limited, noise_error=moments.noise_error
+    )
+    return LimitedNoise(dense, heaviest, int(excess.sum()))
 
 
 def _with_noisy_residuals(moments: Moments) -> Moments:
     """Denoised moments, but for the energy of residuals, which keeps what noise adds to it."""
     assert moments.noise is not None
-    noise = moments.noise.copy()
+    noise = tuple(sums.copy() for sums in moments.noise)
     weights = estimate_noise_std(moments) ** -2.0
     for _ in range(REWEIGHTINGS):
         normal = dataclasses.replace(moments, noise=noise).denoised().pooled(weights)
         theta, rank = solve_least_squares(normal.xx, normal.xy)
-        r = np.append(-theta, 1.0)
-        noise[..., -1, -1] -= np.einsum("m,bjmn,n->bj", r, noise, r)
+        for own, sums in zip(moments.row_columns, noise, strict=True):
+            r = np.append(-theta[own], 1.0)
+            sums[:, -1, -1] -= (sums @ r) @ r
         rows = moments.count.sum(axis=0)
         energy = moments.residual_energy(theta).sum(axis=0)
         floor = NOISE_FLOOR**2 * np.maximum(moments.target_energy().sum(axis=0), np.finfo(np.float64).tiny)
@@ -139,8 +143,7 @@ def _level_error(moments: Moments, estimate: Estimate, theta0: Array) -> Array:
     """Standard error of the parameters that comes of the noise's level, shape (p,): ``H⁺ N_x [-θ, 1] δ``."""
     assert moments.noise is not None
     weights = estimate.noise_std**-2.0
-    noise = np.einsum("j,bjmn->mn", weights, moments.noise)
-    pushed = noise[:-1] @ np.append(theta0 - estimate.parameters, 1.0)
+    pushed = moments.pooled_noise(weights)[:-1] @ np.append(theta0 - estimate.parameters, 1.0)
     W = _unit_directions(estimate.metric)
     return np.asarray(moments.noise_error * W @ (W.T @ pushed))
 

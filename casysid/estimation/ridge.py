@@ -156,9 +156,9 @@ class _RidgeProblem:
         energy, directions, target = self.spectrum
         whitening = self.root @ directions / np.sqrt(energy)
         fitted = whitening @ (target / np.sqrt(energy))
-        residual = problem.gram[:, :-1, -1] - problem.gram[:, :-1, :-1] @ fitted
-        information = whitening.T @ problem.gram[:, :-1, :-1] @ whitening
-        expected = len(energy) - float(np.sum(information**2))
+        residual = problem.moments.scores(fitted)
+        shares = (whitening.T @ block[:-1, :-1] @ whitening for block in problem.moments.by_block())
+        expected = len(energy) - sum(float(np.sum(information**2)) for information in shares)
         white = problem.normal.residual_energy(fitted) / max(float(problem.count.sum()), 1.0)
         floor = max(white, np.finfo(np.float64).eps ** 2)
         return max(float(np.sum((residual @ whitening) ** 2)) / expected, floor) if expected > 0.0 else floor

@@ -57,6 +57,6 @@ def mean_variance(problem: StandardisedProblem, coefficients: Array, used: int) 
     if blocks < 2 or white == 0.0:
         return white
     values, vectors = seen_directions(normal.xx)
-    scores = (problem.gram[:, :-1, -1] - problem.gram[:, :-1, :-1] @ coefficients) @ (vectors / np.sqrt(values))
+    scores = problem.moments.scores(coefficients) @ (vectors / np.sqrt(values))
     between = float(((scores - scores.mean(axis=0)) ** 2).sum()) * blocks / (blocks - 1)
     return max(white, between / len(values))

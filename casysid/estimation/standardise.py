@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -32,9 +33,8 @@ class StandardisedProblem:
     """A regression problem without units, by block of time.
 
     Attributes:
-        gram: ``Σ r rᵀ / N`` by block, ``r = [x, y]`` standardised, shape (blocks, d + 1, d + 1); summed over blocks
+        moments: ``Σ r rᵀ / N``, ``r = [x, y]`` weighted and standardised, of d columns; summed over blocks and joints
             its diagonal is one.
-        count: Rows in each block, shape (blocks,).
         live: Indices of the d columns that have energy, shape (d,).
         scale: ``θ - θ0`` for ``β = 1``, shape (d,).
         prior: ``θ0``, shape (p,).
@@ -43,8 +43,7 @@ class StandardisedProblem:
         target_rms: Root mean square of the weighted target; zero when the prior explains all.
     """
 
-    gram: Array
-    count: Array
+    moments: Moments
     live: npt.NDArray[np.intp]
     scale: Array
     prior: Array
@@ -52,10 +51,15 @@ class StandardisedProblem:
     metric: Array
     target_rms: float
 
-    @property
+    @cached_property
+    def count(self) -> Array:
+        """Rows in each block, shape (blocks,)."""
+        return frozen(self.moments.count.sum(axis=1))
+
+    @cached_property
     def normal(self) -> NormalEquations:
         """All blocks: ``xx`` with unit diagonal, ``yy`` of one, means over rows."""
-        return _normal_equations(self.gram.sum(axis=0), float(self.count.sum()))
+        return self.moments.pooled()
 
     @property
     def is_degenerate(self) -> bool:
@@ -64,14 +68,12 @@ class StandardisedProblem:
 
     def restricted_to(self, columns: npt.NDArray[np.intp]) -> StandardisedProblem:
         """The same with some of the d columns only; the others stay at the prior."""
-        kept = np.append(columns, len(self.live))
-        gram = frozen(self.gram[:, kept[:, None], kept])
-        return dataclasses.replace(self, gram=gram, live=self.live[columns], scale=frozen(self.scale[columns]))
+        moments = self.moments.select_columns(columns)
+        return dataclasses.replace(self, moments=moments, live=self.live[columns], scale=frozen(self.scale[columns]))
 
     def normal_of(self, blocks: npt.ArrayLike) -> NormalEquations:
         """The given blocks only, still divided by the number of all rows."""
-        chosen = np.asarray(blocks)
-        return _normal_equations(self.gram[chosen].sum(axis=0), float(self.count[chosen].sum()))
+        return self.moments.select_blocks(blocks).pooled()
 
     def restore(self, coefficients: Array) -> Array:
         """``θ`` of shape (p,) from standardised ``β`` of shape (d,)."""
@@ -121,23 +123,28 @@ def standardise(moments: Moments, prior: Array | None = None) -> StandardisedPro
     theta0 = check_prior(moments, prior)
     shifted = moments.shifted(theta0)
     noise_std = estimate_noise_std(shifted)
-    blocks = np.einsum("j,bjmn->bmn", noise_std**-2.0, shifted.gram)  # (blocks, p + 1, p + 1)
-    total, rows = blocks.sum(axis=0), max(float(moments.count.sum()), 1.0)
-    energy = np.diag(total)[:-1] / rows
+    total, rows = shifted.pooled(noise_std**-2.0), max(float(moments.count.sum()), 1.0)
+    energy = np.diag(total.xx) / rows
     live = np.flatnonzero(energy > ENERGY_TOLERANCE * max(energy.max(initial=0.0), np.finfo(np.float64).tiny))
-    target_rms = float(np.sqrt(max(total[-1, -1], 0.0) / rows))
+    target_rms = float(np.sqrt(max(total.yy, 0.0) / rows))
     divisor = np.append(np.sqrt(energy[live]), target_rms or 1.0)
-    kept = np.append(live, len(energy))
     return StandardisedProblem(
-        gram=frozen(blocks[:, kept[:, None], kept] / (rows * np.outer(divisor, divisor))),
-        count=frozen(moments.count.sum(axis=1)),
+        moments=_scaled(shifted.select_columns(live), noise_std**-2.0 / rows, 1.0 / divisor),
         live=live,
         scale=frozen(divisor[-1] / divisor[:-1]),
         prior=frozen(theta0),
         noise_std=frozen(noise_std),
-        metric=frozen(total[:-1, :-1]),
+        metric=total.xx,
         target_rms=target_rms,
     )
+
+
+def _scaled(moments: Moments, weights: Array, units: Array) -> Moments:
+    """Moments of rows multiplied by roots of ``weights``, (joints,), in columns multiplied by ``units``, (p + 1,)."""
+    own = [np.append(units[columns], units[-1]) for columns in moments.row_columns]
+    squares = zip(moments.squares, weights, own, strict=True)
+    scaled = tuple(sums * (weight * np.outer(unit, unit)) for sums, weight, unit in squares)
+    return dataclasses.replace(moments, squares=scaled, noise=None, noise_error=0.0)
 
 
 def check_prior(moments: Moments, prior: Array | None) -> Array:
@@ -184,7 +191,3 @@ def unseen_coordinates(xx: Array) -> npt.NDArray[np.bool_]:
     """Which coordinates a Gram matrix of shape (d, d) leaves open, because a direction in its null space moves them."""
     _, vectors = seen_directions(xx)
     return np.asarray(1.0 - np.einsum("mk,mk->m", vectors, vectors) > LEVERAGE_TOLERANCE)
-
-
-def _normal_equations(gram: Array, count: float) -> NormalEquations:
-    return NormalEquations(frozen(gram[:-1, :-1]), frozen(gram[:-1, -1]), float(gram[-1, -1]), count)

@@ -75,8 +75,8 @@ class TotalLeastSquares:
         p, joints = len(moments.columns), len(moments.joints)
         weights, count = problem.noise_std**-2.0, moments.count.sum(axis=0)
         if self.noise_covariance is None:
-            energy = np.einsum("j,bjmm->m", weights, moments.gram)
-            pooled = np.diag(energy) / count.sum()
+            normal = moments.pooled(weights)
+            pooled = np.diag(np.append(np.diag(normal.xx), normal.yy)) / count.sum()
         else:
             try:
                 each = np.broadcast_to(self.noise_covariance, (joints, p + 1, p + 1))

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from casysid.arrays import Array, frozen
-from casysid.dynamics import Armature, Coulomb, FrictionColumn, Offset, Regressor, Viscous, build_regressor
+from casysid.dynamics import Armature, Coulomb, FrictionKind, Offset, Regressor, Viscous, build_regressor
 from casysid.errors import ParameterError
 from casysid.excitation.blocks import Block, TorqueBlock, joint_block
 from casysid.excitation.capsules import Capsule, capsules_of
@@ -45,7 +45,7 @@ def build_excitation(
     rate: float = 500.0,
     limits: JointLimits | None = None,
     criterion: Criterion | None = None,
-    friction: Sequence[FrictionColumn] | None = None,
+    friction: Sequence[FrictionKind] | None = None,
     parameters: npt.ArrayLike | None = None,
     torque_noise: npt.ArrayLike | None = None,
     capsules: Sequence[Capsule] | None = None,
@@ -133,7 +133,7 @@ def _joint_blocks(regressor: Regressor, limits: JointLimits, theta: Array) -> li
     return [*(block for block in found if block is not None), *torque]
 
 
-def default_friction(limits: JointLimits) -> tuple[FrictionColumn, ...]:
+def default_friction(limits: JointLimits) -> tuple[FrictionKind, ...]:
     """Viscous, Coulomb, offset, armature; the Coulomb column's width in proportion to the velocity limit."""
     return Viscous(), Coulomb(width=COULOMB_SHARE * limits.velocity), Offset(), Armature()
 

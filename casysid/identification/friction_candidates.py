@@ -7,56 +7,62 @@ from dataclasses import dataclass
 
 from casysid.arrays import Array
 from casysid.dynamics import (
+    PHYSICAL_KINDS,
     Armature,
-    AsymmetricViscous,
     Coulomb,
     Coupling,
     Direction,
-    FrictionColumn,
-    LoadedCoulomb,
-    PowerViscous,
-    Spring,
-    Stribeck,
+    FrictionKind,
+    FrictionModel,
+    JointUse,
     Viscous,
 )
 from casysid.dynamics.friction import coupling_direction, joint_directions
 from casysid.robot import JointKind, Robot
 
-STRIBECK_VELOCITIES = (0.05, 0.15, 0.4, 1.0)
-"""Candidates, in root mean square velocities of the joint."""
-EXPONENTS = (0.5, 2.0, 3.0)
-"""Candidates of viscous friction's power, beside one."""
 SIMPLE_JOINTS = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
-COUPLED = (Viscous, Coulomb, Armature), (Viscous, Coulomb), (Armature,)
+COUPLED = (Viscous.kind, Coulomb.kind, Armature.kind), (Viscous.kind, Coulomb.kind), (Armature.kind,)
 """What a transmission between two joints may bring."""
 
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """One candidate as columns along directions.
+    """One candidate as kinds of friction along directions.
 
     Attributes:
         name: Of proposals with the same name at most one is taken.
         kind: Of friction, or ``coupling``.
-        columns: Each with where it acts.
+        columns: Kinds of friction, each with where it acts.
         joints: Degrees of freedom on which they act.
         coupling: The transmission, if it is one.
     """
 
     name: str
     kind: str
-    columns: tuple[tuple[FrictionColumn, Direction], ...]
+    columns: tuple[tuple[FrictionKind, Direction], ...]
     joints: tuple[int, ...]
     coupling: Coupling | None = None
 
     @property
     def family(self) -> str:
         """The kind where it comes from how a drive is built, so that a robot's other drives may have it too."""
-        return self.kind if self.kind in (Stribeck.kind, PowerViscous.kind, LoadedCoulomb.kind) else ""
+        return self.kind if self.coupling is None and self.columns[0][0].by_design else ""
+
+    @property
+    def description(self) -> str:
+        """What a person calls it, with the numbers that enter nonlinearly."""
+        kind, direction = self.columns[0]
+        if self.coupling is None:
+            return kind.describe(direction)
+        return f"coupled as {direction.name} by {', '.join(one.kind for one, _ in self.columns)}"
 
 
 def propose(
-    robot: Robot, friction: Sequence[FrictionColumn], couplings: Sequence[Coupling], speed: Array, width: Array
+    robot: Robot,
+    friction: Sequence[FrictionKind],
+    couplings: Sequence[Coupling],
+    uses: Mapping[int, JointUse],
+    kinds: Sequence[type[FrictionKind]] = PHYSICAL_KINDS,
 ) -> tuple[Proposal, ...]:
     """Everything that may join the given friction and couplings of a robot.
 
@@ -64,65 +70,73 @@ def propose(
         robot: Its joints with one degree of freedom are looked at.
         friction: What every joint has already; kinds of it are not proposed again.
         couplings: Transmissions that are known already.
-        speed: Root mean square velocity of each degree of freedom, shape (nv,); those that stand get no proposal.
-        width: Of each one's smooth sign, shape (nv,).
+        uses: How degrees of freedom move, by their index; those that stand get no proposal.
+        kinds: Of friction that are asked for candidates.
     """
-    known = {column.kind for column in friction}
+    known = {kind.kind for kind in friction}
     moving = {
-        dof: direction
-        for dof, direction in joint_directions(robot).items()
-        if speed[dof] > 0.0 and robot.joints[joint_of(robot, dof)].kind in SIMPLE_JOINTS
+        dof: use
+        for dof, use in uses.items()
+        if use.speed > 0.0 and robot.joints[joint_of(robot, dof)].kind in SIMPLE_JOINTS
     }
-    widths = tuple(width.tolist())
     alone = [
-        Proposal(f"{direction.name}.{column.kind}", column.kind, ((column, direction),), (dof,))
-        for dof, direction in moving.items()
-        for column in _columns_of_a_joint(robot, dof, direction, float(speed[dof]), widths)
-        if column.kind not in known
+        Proposal(f"{use.direction.name}.{kind.kind}", kind.kind, ((one, use.direction),), (dof,))
+        for dof, use in moving.items()
+        for kind in kinds
+        if kind.kind not in known
+        for one in kind.candidates(use)
     ]
-    return (*alone, *_transmissions(robot, friction, couplings, moving, widths))
+    return (*alone, *_transmissions(robot, friction, couplings, moving))
 
 
-def _columns_of_a_joint(
-    robot: Robot, dof: int, direction: Direction, speed: float, width: tuple[float, ...]
-) -> Iterator[FrictionColumn]:
-    name = direction.name
-    yield AsymmetricViscous((name,))
-    for share in STRIBECK_VELOCITIES:
-        if share * speed > width[dof]:
-            yield Stribeck(width, {name: share * speed})
-    for exponent in EXPONENTS:
-        yield PowerViscous(width, {name: exponent})
-    yield LoadedCoulomb(width, (name,))
-    if robot.joints[joint_of(robot, dof)].kind is not JointKind.CONTINUOUS:
-        yield Spring((name,))
+def joint_uses(robot: Robot, speed: Array, width: Array, travel: Array | None = None) -> dict[int, JointUse]:
+    """How every driven degree of freedom moves, by its index; ripple is not looked for.
+
+    Args:
+        robot: The robot.
+        speed: Root mean square velocity of each degree of freedom, shape (nv,).
+        width: Of each one's smooth sign, shape (nv,).
+        travel: Standard deviation of its position, shape (nv,); None where it is not known.
+    """
+    return {
+        dof: JointUse(direction, float(speed[dof]), float(width[dof]), None if travel is None else float(travel[dof]))
+        for dof, direction in joint_directions(robot).items()
+    }
+
+
+def joined(friction: Sequence[FrictionKind], couplings: Sequence[Coupling], taken: Sequence[Proposal]) -> FrictionModel:
+    """Friction and couplings with the proposals that were taken, all joints of a kind in one."""
+    alone = [kind for one in taken if one.coupling is None for kind, _ in one.columns]
+    coupled = [one.coupling for one in taken if one.coupling is not None]
+    return FrictionModel(tuple(friction), tuple(couplings)).joined_by(alone, coupled)
 
 
 def _transmissions(
     robot: Robot,
-    friction: Sequence[FrictionColumn],
+    friction: Sequence[FrictionKind],
     couplings: Sequence[Coupling],
-    moving: Mapping[int, Direction],
-    width: tuple[float, ...],
+    moving: Mapping[int, JointUse],
 ) -> Iterator[Proposal]:
     """Motors that turn with the sum or the difference of two neighbouring joints of the same kind of motion."""
     taken = [set(coupling.joints) for coupling in couplings]
     for first, second in _neighbours(robot, moving):
-        names = (moving[first].name, moving[second].name)
-        if set(names) in taken or moving[first].linear != moving[second].linear:
+        one, other = moving[first].direction, moving[second].direction
+        names = (one.name, other.name)
+        if set(names) in taken or one.linear != other.linear:
             continue
         for sign in (1.0, -1.0):
-            for kinds in COUPLED:
-                columns = [column for column in friction if isinstance(column, kinds)]
-                if len(columns) < len(kinds):
+            for wanted in COUPLED:
+                kinds = [kind for kind in friction if kind.kind in wanted]
+                if len(kinds) < len(wanted):
                     continue
-                coupling = Coupling(names, (1.0, sign), tuple(column.kind for column in columns))
+                coupling = Coupling(names, (1.0, sign), tuple(kind.kind for kind in kinds))
                 direction = coupling_direction(robot, coupling)
-                made = tuple((Coulomb(width) if isinstance(one, Coulomb) else one, direction) for one in columns)
-                yield Proposal("+".join(names), "coupling", made, (first, second), coupling)
+                own = {direction.name: moving[first].width + moving[second].width}
+                columns = tuple((kind.with_width(own), direction) for kind in kinds)
+                yield Proposal("+".join(names), "coupling", columns, (first, second), coupling)
 
 
-def _neighbours(robot: Robot, moving: Mapping[int, Direction]) -> Iterator[tuple[int, int]]:
+def _neighbours(robot: Robot, moving: Mapping[int, JointUse]) -> Iterator[tuple[int, int]]:
     for joint in robot.joints:
         if joint.parent >= 0:
             first, second = robot.joints[joint.parent].v.start, joint.v.start

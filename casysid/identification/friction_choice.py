@@ -13,19 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.dynamics import (
-    Armature,
-    AsymmetricViscous,
-    Coupling,
-    FrictionColumn,
-    LoadedCoulomb,
-    PowerViscous,
-    Spring,
-    Stribeck,
-    extend_regressor,
-)
-from casysid.dynamics.friction_kinds import value_at
-from casysid.identification.friction_candidates import Proposal, propose
+from casysid.dynamics import Armature, extend_regressor
+from casysid.identification.friction_candidates import Proposal, joined, joint_uses, propose
 from casysid.identification.friction_evidence import Candidate, Finding, build_evidence, choose_candidates
 from casysid.identification.friction_laws import physics_rows
 from casysid.identification.problem import (
@@ -114,7 +103,7 @@ def choose_friction(
     width = coulomb_width(motions, relative_width)
     if settings.coulomb_width is not None:
         width = np.full(robot.nv, settings.coulomb_width)
-    proposals = propose(robot, settings.friction, settings.couplings, speed, width)
+    proposals = propose(robot, settings.friction, settings.couplings, joint_uses(robot, speed, width))
     if settings.quasi_static:
         proposals = tuple(one for one in proposals if Armature.kind not in [column.kind for column, _ in one.columns])
     if not proposals:
@@ -144,56 +133,11 @@ def _any_noisy(recordings: Sequence[Recording], smoothing: float) -> bool:
 
 
 def _with_friction(settings: Settings, taken: Sequence[Proposal]) -> Settings:
-    """The settings with the proposals' columns, all joints of a kind in one column, and their couplings."""
-    names: dict[str, list[str]] = {}
-    values: dict[str, dict[str, float]] = {}
-    for proposal in taken:
-        column, direction = proposal.columns[0]
-        if isinstance(column, Stribeck | PowerViscous):
-            nonlinear = column.velocity if isinstance(column, Stribeck) else column.exponent
-            values.setdefault(column.kind, {})[direction.name] = value_at(nonlinear, direction) or 0.0
-        names.setdefault(proposal.kind, []).append(direction.name)
-    columns: dict[str, FrictionColumn] = {}
-    for kind in names:
-        if kind == AsymmetricViscous.kind:
-            columns[kind] = AsymmetricViscous(tuple(names[kind]))
-        elif kind == Spring.kind:
-            columns[kind] = Spring(tuple(names[kind]))
-        elif kind == LoadedCoulomb.kind:
-            columns[kind] = LoadedCoulomb(joints=tuple(names[kind]))
-        elif kind == Stribeck.kind:
-            columns[kind] = Stribeck(velocity=values[kind])
-        elif kind == PowerViscous.kind:
-            columns[kind] = PowerViscous(exponent=values[kind])
-    couplings: tuple[Coupling, ...] = tuple(one.coupling for one in taken if one.coupling is not None)
-    return dataclasses.replace(
-        settings,
-        friction=(*settings.friction, *columns.values()),
-        couplings=(*settings.couplings, *couplings),
-        choose_friction=False,
-    )
+    """The settings with what was taken."""
+    model = joined(settings.friction, settings.couplings, taken)
+    return dataclasses.replace(settings, friction=model.columns, couplings=model.couplings, choose_friction=False)
 
 
 def _chosen(robot: Robot, proposal: Proposal, finding: Finding) -> ChosenFriction:
     joints = tuple(robot.dofs[joint] for joint in proposal.joints)
-    return ChosenFriction(joints, proposal.kind, _words(proposal), finding.error_before, finding.error_after)
-
-
-def _words(proposal: Proposal) -> str:
-    """What a person calls a proposal, with the numbers that enter nonlinearly."""
-    column, direction = proposal.columns[0]
-    if proposal.coupling is not None:
-        return f"coupled as {direction.name} by {', '.join(one.kind for one, _ in proposal.columns)}"
-    match column:
-        case Stribeck():
-            unit = "m/s" if direction.linear else "rad/s"
-            return f"Stribeck (v_s = {value_at(column.velocity, direction):.3g} {unit})"
-        case PowerViscous():
-            return f"viscous to the power {value_at(column.exponent, direction):g}"
-        case AsymmetricViscous():
-            return "viscous by direction of motion"
-        case LoadedCoulomb():
-            return "Coulomb in proportion to the load"
-        case Spring():
-            return "spring"
-    return column.kind
+    return ChosenFriction(joints, proposal.kind, proposal.description, finding.error_before, finding.error_after)

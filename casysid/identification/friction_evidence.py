@@ -149,17 +149,11 @@ def _families(chosen: Sequence[Finding]) -> frozenset[str]:
     return frozenset(finding.candidate.family for finding in chosen) - {""}
 
 
-def _columns(moments: Moments, columns: Indices) -> Moments:
-    kept = np.append(columns, len(moments.columns))
-    names = tuple(moments.columns[column] for column in columns)
-    return Moments(moments.gram[:, :, kept[:, None], kept], moments.count, names, moments.joints)
-
-
 def _best(
     evidence: Evidence, base: Indices, candidates: Sequence[Candidate], familiar: frozenset[str]
 ) -> Finding | None:
     """The candidate of largest gain among those that pass every test; None when none does."""
-    model = _columns(evidence.moments, base)
+    model = evidence.moments.select_columns(base)
     fit = Ridge(standard_errors=False).estimate(model, evidence.prior[base])
     weights = fit.noise_std**-2.0
     pull = fit.metric - model.pooled(weights).xx

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.dynamics import Armature, AsymmetricViscous, Regressor, Viscous
+from casysid.dynamics import Armature, Regressor
 from casysid.projection import LinearKnowledge
 
 ROUNDING = 1e-6
@@ -14,16 +14,8 @@ ROUNDING = 1e-6
 
 def friction_laws(regressor: Regressor) -> tuple[LinearKnowledge, ...]:
     """What friction obeys beside the signs of its coefficients: no direction of motion is driven by it."""
-    names = set(regressor.names)
-    pairs = [
-        (f"{parameter.owner}.{Viscous.kind}", parameter.name)
-        for parameter in regressor.parameters
-        if parameter.kind == AsymmetricViscous.kind and f"{parameter.owner}.{Viscous.kind}" in names
-    ]
     return tuple(
-        LinearKnowledge(coefficients={viscous: 1.0, asymmetry: sign}, lower=0.0, name=f"{viscous} in either direction")
-        for viscous, asymmetry in pairs
-        for sign in (1.0, -1.0)
+        LinearKnowledge(coefficients=law.coefficients, lower=0.0, name=law.name) for law in regressor.friction_laws
     )
 
 
@@ -38,7 +30,7 @@ def physics_rows(regressor: Regressor) -> Array:
         for parameter in regressor.parameters[regressor.robot.inertial_parameters.size :]
         if parameter.non_negative and parameter.kind != Armature.kind
     ]
-    laws = [*signs, *(dict(law.coefficients) for law in friction_laws(regressor))]
+    laws = [*signs, *(dict(law.coefficients) for law in regressor.friction_laws)]
     rows = np.zeros((len(laws), len(places)))
     for row, law in enumerate(laws):
         for name, coefficient in law.items():
@@ -55,7 +47,7 @@ def broken_laws(regressor: Regressor, parameters: Array) -> tuple[str, ...]:
         largest[owners[name]] = max(largest.get(owners[name], 0.0), abs(float(value)))
     broken = [
         law.name
-        for law in friction_laws(regressor)
+        for law in regressor.friction_laws
         if sum(weight * values[name] for name, weight in law.coefficients.items())
         < -ROUNDING * max(largest[owners[name]] for name in law.coefficients)
     ]

@@ -61,19 +61,19 @@ class HeldOutErrors:
         self.weights, self.model = weights, model
         self.others = np.setdiff1d(np.arange(p), model)
         self._place = {int(column): k for k, column in enumerate(self.others)}
-        self._tests = np.stack([moments.gram[blocks].sum(axis=0) for blocks in stretches])  # (f, joints, p + 1, p + 1)
-        counts = np.array([moments.count[blocks].sum() for blocks in stretches])
-        self._total = np.einsum("j,bjmn->mn", weights, moments.gram)
+        self._tests = moments.merged_blocks(stretches)
+        counts = self._tests.count.sum(axis=1)
+        self._total = next(moments.merged_blocks([np.arange(moments.blocks)]).by_block(weights))
         energy = np.diag(self._total)[:-1]
         energy = np.where(energy > 0.0, energy, 1.0)
         self._model_pull = pull + LEAST_STRENGTH * np.diag(energy[model])
         self._others_pull = max(strength, LEAST_STRENGTH) * np.diag(energy[self.others])
         rest = counts.sum() / np.maximum(counts.sum() - counts, 1.0)
         self._fits = [
-            self._eliminate((self._total - np.einsum("j,jmn->mn", weights, test)) * factor)
-            for test, factor in zip(self._tests, rest, strict=True)
+            self._eliminate((self._total - test) * factor)
+            for test, factor in zip(self._tests.by_block(weights), rest, strict=True)
         ]
-        self.target = np.einsum("fj->fj", self._tests[:, :, -1, -1])
+        self.target = self._tests.target_energy()
 
     def _eliminate(self, gram: Array) -> _Elimination:
         B, C = self.model, self.others
@@ -86,15 +86,16 @@ class HeldOutErrors:
     @cached_property
     def _by_joint(self) -> list[tuple[dict[int, int], Array]]:
         """For each joint the columns that may join its row, and its quadratic forms in them, (f, u + 1, u + 1)."""
-        return [self._quadratic(joint) for joint in range(self._tests.shape[1])]
+        return [self._quadratic(joint) for joint in range(len(self.weights))]
 
     def _quadratic(self, joint: int) -> tuple[dict[int, int], Array]:
-        energy = np.einsum("fmm->m", self._tests[:, joint])[:-1]
-        own = np.flatnonzero(energy[self.others] > 0.0)
-        model = np.flatnonzero(energy[self.model] > 0.0)
-        rows = np.concatenate([self.model[model], self.others[own], [self._total.shape[0] - 1]])
+        columns, squares = self._tests.of_joint(joint)
+        felt = columns[np.einsum("fmm->m", squares)[:-1] > 0.0]
+        own, model = (np.flatnonzero(np.isin(some, felt)) for some in (self.others, self.model))
+        places = np.searchsorted(columns, np.concatenate([self.model[model], self.others[own]]))
+        rows = np.append(places, len(columns))
         kept, forms = np.append(own, len(self.others)), []
-        for test, fit in zip(self._tests[:, joint], self._fits, strict=True):
+        for test, fit in zip(squares, self._fits, strict=True):
             T = np.vstack([-fit.model[np.ix_(model, kept)], np.eye(len(kept))])
             forms.append(T.T @ test[rows[:, None], rows] @ T)
         return {int(k): place for place, k in enumerate(own)}, np.stack(forms)
@@ -120,11 +121,8 @@ class HeldOutErrors:
 
     def all_energies(self, columns: Sequence[int]) -> Array:
         """Residual energy of every joint in each stretch with ``columns`` in the model, shape (f, joints)."""
-        energies = []
-        for test, fit in zip(self._tests, self._fits, strict=True):
-            r = np.append(-self._expand(fit, columns), 1.0)
-            energies.append(np.einsum("m,jmn,n->j", r, test, r))
-        return np.maximum(energies, 0.0)
+        fits = [self._expand(fit, columns) for fit in self._fits]
+        return np.vstack([self._tests.select_blocks([f]).residual_energy(theta) for f, theta in enumerate(fits)])
 
     def fit(self, columns: Sequence[int]) -> Array:
         """Parameters from all data with ``columns`` in the model, shape (p,)."""

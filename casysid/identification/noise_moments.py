@@ -21,6 +21,7 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.dynamics import Coulomb, LoadedCoulomb, PowerViscous, Regressor, Stribeck
 from casysid.errors import ParameterError
+from casysid.moments import Moments
 from casysid.recording import Recording
 from casysid.signals import InputNoise
 
@@ -37,18 +38,18 @@ def noise_moments(
     regressor: Regressor,
     recordings: Sequence[Recording],
     noise: Sequence[InputNoise | None],
-    gram: Array,
-    sums_of: Callable[[Sequence[Recording]], Array],
+    moments: Moments,
+    sums_of: Callable[[Sequence[Recording]], Moments],
     *,
     as_logged: bool,
-) -> Array:
-    """What ``noise`` has added to ``gram``, of its shape.
+) -> tuple[Array, ...]:
+    """What ``noise`` has added to the squares of ``moments``, shaped like them.
 
     Args:
         regressor: Whose columns were summed.
         recordings: As measured.
         noise: Of each recording.
-        gram: Moments of the recordings.
+        moments: Of the recordings.
         sums_of: Moments of disturbed recordings, taken in the same way.
         as_logged: Whether no low-pass has made the noise small.
 
@@ -59,21 +60,24 @@ def noise_moments(
     if len(known) < len(recordings):
         raise ParameterError("noise moments: the noise of every recording must be known")
 
-    def growth(scale: float) -> Array:
-        total = np.zeros_like(gram)
+    def growth(scale: float) -> list[Array]:
+        total = [np.zeros_like(squares) for squares in moments.squares]
         for draw in range(draws):
             for sign in (scale, -scale):
-                total += sums_of(
-                    [
-                        one.disturb(recording, sign, seed=draw * len(recordings) + k)
-                        for k, (one, recording) in enumerate(zip(known, recordings, strict=True))
-                    ]
-                )
-        return total / (2 * draws) - gram
+                disturbed = [
+                    one.disturb(recording, sign, seed=draw * len(recordings) + k)
+                    for k, (one, recording) in enumerate(zip(known, recordings, strict=True))
+                ]
+                for own, squares in zip(total, sums_of(disturbed).squares, strict=True):
+                    own += squares
+        return [own / (2 * draws) - squares for own, squares in zip(total, moments.squares, strict=True)]
 
     draws = DRAWS_AS_LOGGED if as_logged else DRAWS if sum(map(len, recordings)) < LONG else 1
-    added = 3.0 * growth(1.0) - growth(np.sqrt(2.0)) if as_logged else growth(1.0)
-    if not as_logged:
-        expected = [m for m, parameter in enumerate(regressor.parameters) if parameter.kind in EXPECTED_KINDS]
-        added[..., expected, :] = added[..., :, expected] = 0.0
-    return added
+    added = growth(1.0)
+    if as_logged:
+        return tuple(3.0 * once - twice for once, twice in zip(added, growth(np.sqrt(2.0)), strict=True))
+    expected = [m for m, parameter in enumerate(regressor.parameters) if parameter.kind in EXPECTED_KINDS]
+    for columns, own in zip(moments.row_columns, added, strict=True):
+        places = np.flatnonzero(np.isin(columns, expected))
+        own[:, places, :] = own[:, :, places] = 0.0
+    return tuple(added)

@@ -52,7 +52,7 @@ def _write_model(result: IdentificationResult, directory: Path, export_inconsist
         path.unlink(missing_ok=True)
         return (f"{path.name} is withheld because the parameters are not physically consistent.",)
     homeless = _homeless(result)
-    plain = nearest_plain_friction(result.regressor.parameters, result.parameters, result.moments, homeless)
+    plain = nearest_plain_friction(result.regressor, result.parameters, result.moments, homeless)
     written = write_robot(
         result.robot,
         path,

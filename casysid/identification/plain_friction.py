@@ -8,33 +8,36 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from casysid.arrays import Array
-from casysid.dynamics import Armature, Coulomb, Offset, Parameter, Spring, Viscous
+from casysid.dynamics import Coulomb, Offset, Regressor, Viscous
 from casysid.moments import Moments
 
 PLAIN = (Viscous.kind, Coulomb.kind)
 
 
 def nearest_plain_friction(
-    columns: Sequence[Parameter], theta: Array, moments: Moments, homeless: Sequence[str]
+    regressor: Regressor, theta: Array, moments: Moments, homeless: Sequence[str]
 ) -> dict[str, Array]:
     """Viscous and Coulomb coefficients by degree of freedom, shape (nv,) each, that stand for other friction too.
 
     On the fitted motions, the torque of each joint's friction with its other columns is nearest to that of these
-    coefficients and an offset. Joints without other columns keep theirs; armature and springs are no friction.
+    coefficients and an offset. Joints without other columns keep theirs; armature, springs and other kinds that take
+    no energy out of the motion are no friction.
 
     Args:
-        columns: The regressor's.
+        regressor: Whose columns these are.
         theta: Their values, shape (p,).
         moments: Of the fitted motions.
         homeless: Names of the columns that a robot file has no place for.
     """
-    places = {column.name: k for k, column in enumerate(columns)}
-    kinds = {column.name: column.kind for column in columns}
+    places = {name: k for k, name in enumerate(regressor.names)}
+    friction = {column for part in regressor.parts if part.kind.is_friction for column in part.columns}
     found = {kind: np.zeros(len(moments.joints)) for kind in PLAIN}
     for joint, dof in enumerate(moments.joints):
-        gram = moments.gram[:, joint, :-1, :-1].sum(axis=0)
+        row, squares = moments.of_joint(joint)
+        gram = np.zeros((len(columns), len(columns)))
+        gram[row[:, None], row] = squares[:, :-1, :-1].sum(axis=0)
         own = {kind: places[name] for kind in PLAIN if (name := f"{dof}.{kind}") in places}
-        other = [places[name] for name in homeless if kinds[name] not in (Armature.kind, Spring.kind)]
+        other = [places[name] for name in homeless if places[name] in friction]
         other = [column for column in other if gram[column, column] > 0.0]
         values = {kind: float(theta[column]) for kind, column in own.items()}
         if own and other:

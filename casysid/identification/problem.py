@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
-from casysid.dynamics import FrictionColumn, Regressor, build_regressor, with_width
+from casysid.dynamics import FrictionKind, Regressor, build_regressor, with_width
 from casysid.estimation import ErrorsInVariables
 from casysid.identification.noise_moments import noise_moments
 from casysid.identification.settings import Settings
@@ -98,16 +98,16 @@ def build_problem(
     moments = sum_moments(regressor, motions, cutoff, settings)
     if input_noise is not None:
 
-        def sums_of(disturbed: Sequence[Recording]) -> Array:
+        def sums_of(disturbed: Sequence[Recording]) -> Moments:
             noisier = [
                 dataclasses.replace(
                     make_motion(robot, recording, cutoff, smoothing=motion.cutoff), standing=motion.standing
                 )
                 for recording, motion in zip(disturbed, motions, strict=True)  # the same equations, noisier
             ]
-            return sum_moments(regressor, noisier, cutoff, settings).gram
+            return sum_moments(regressor, noisier, cutoff, settings)
 
-        added = noise_moments(regressor, recordings, noise, moments.gram, sums_of, as_logged=cutoff is None)
+        added = noise_moments(regressor, recordings, noise, moments, sums_of, as_logged=cutoff is None)
         moments = dataclasses.replace(moments, noise=added, noise_error=input_noise.relative_error)
     return LinearProblem(regressor, motions, moments, cutoff, input_noise)
 
@@ -117,7 +117,7 @@ def with_widths(
     motions: Sequence[Motion],
     relative_width: float | Array,
     input_noise: InputNoise | None = None,
-) -> tuple[FrictionColumn, ...]:
+) -> tuple[FrictionKind, ...]:
     """The friction columns asked for, their smooth signs as sharp as the motions allow."""
     width = settings.coulomb_width or tuple(coulomb_width(motions, relative_width, input_noise).tolist())
     return with_width(settings.friction, width)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from casysid.dynamics import DEFAULT_FRICTION, Coupling, FrictionColumn
+from casysid.dynamics import DEFAULT_FRICTION, Coupling, FrictionKind
 from casysid.errors import ParameterError
 from casysid.estimation import Estimator, Ridge
 from casysid.inertia import Consistency
@@ -47,7 +47,7 @@ class Settings:
     flip: tuple[str, ...] = ()
     cutoff: float | None = None
     delay: float | None = None
-    friction: tuple[FrictionColumn, ...] = DEFAULT_FRICTION
+    friction: tuple[FrictionKind, ...] = DEFAULT_FRICTION
     choose_friction: bool = True
     coulomb_width: float | None = None
     couplings: tuple[Coupling, ...] = ()

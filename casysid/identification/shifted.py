@@ -36,13 +36,13 @@ class ShiftedMoments:
     """Sums of ``r rᵀ``, ``r = [x, y_1 .. y_K]``, by block of time and joint, ``y_k`` the torque ``nodes[k]`` later.
 
     Attributes:
-        gram: Shape (blocks, joints, p + K, p + K).
+        squares: Of each joint in its own w columns, shape (blocks, w + K, w + K).
         count: Rows in each sum, shape (blocks, joints).
         nodes: Delays [s], evenly spaced, shape (K,).
         regressor: Of the rows ``x``.
     """
 
-    gram: Array
+    squares: tuple[Array, ...]
     count: Array
     nodes: Array
     regressor: Regressor
@@ -59,15 +59,16 @@ class ShiftedMoments:
         values, slopes = self._lagrange(delays)
         groups = np.zeros((0, joints)) if groups is None else groups
         mixing = np.concatenate([-groups[:, :, None] * slopes, values[None]])  # (G + 1, joints, K)
-        size = p + len(mixing)
-        gram = np.empty((*self.gram.shape[:2], size, size))
-        gram[..., :p, :p] = self.gram[..., :p, :p]
-        mixed = np.einsum("bjmk,gjk->bjmg", self.gram[..., p:], mixing)
-        gram[..., :p, p:] = mixed[..., :p, :]
-        gram[..., p:, :p] = np.swapaxes(mixed[..., :p, :], 2, 3)
-        gram[..., p:, p:] = np.einsum("bjkg,hjk->bjhg", mixed[..., p:, :], mixing)
+        rows, squares = [], []
+        for joint, (own, sums) in enumerate(zip(self.regressor.row_columns, self.squares, strict=True)):
+            felt = np.append(np.flatnonzero(groups[:, joint]), len(groups))
+            T = np.zeros((sums.shape[1], len(own) + len(felt)))
+            T[np.arange(len(own)), np.arange(len(own))] = 1.0
+            T[len(own) :, len(own) :] = mixing[felt, joint].T
+            squares.append(T.T @ sums @ T)
+            rows.append(np.append(own, p + felt[:-1]))
         names = (*self.regressor.names, *(f"delay_{g + 1}" for g in range(len(groups))))
-        return Moments(gram, self.count, names, self.regressor.robot.dofs)
+        return Moments(tuple(squares), tuple(rows), self.count, names, self.regressor.robot.dofs)
 
     def _lagrange(self, delays: Array) -> tuple[Array, Array]:
         """Weights of the nodes for the torque and for its slope at each delay, shape (joints, K) each."""
@@ -110,8 +111,9 @@ def sum_shifted_moments(
         _sum_one(regressor, motion, _thinned(recording, cutoff), nodes, cutoff, blocks, threads)
         for motion, recording in zip(motions, recordings, strict=True)
     ]
-    gram, count = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    return ShiftedMoments(gram, np.repeat(count[:, None], regressor.robot.nv, axis=1), frozen(nodes), regressor)
+    squares = tuple(frozen(np.concatenate(own)) for own in zip(*(sums for sums, _ in parts), strict=True))
+    count = np.concatenate([rows for _, rows in parts])
+    return ShiftedMoments(squares, np.repeat(count[:, None], regressor.robot.nv, axis=1), frozen(nodes), regressor)
 
 
 def _thinned(recording: Recording, cutoff: float) -> tuple[Array, Array]:
@@ -131,12 +133,12 @@ def _sum_one(
     cutoff: float,
     blocks: int,
     threads: int,
-) -> tuple[Array, Array]:
-    """Sums over one recording, shape (blocks, joints, p + K, p + K), and rows by block, shape (blocks,)."""
-    p, size = len(regressor.names), len(regressor.names) + len(nodes)
+) -> tuple[list[Array], Array]:
+    """Sums over one recording of each joint, shape (blocks, w + K, w + K), and rows by block, shape (blocks,)."""
     ends = np.searchsorted(motion.time, [torque[0][0] - min(nodes[0], 0.0), torque[0][-1] - max(nodes[-1], 0.0)])
     inside = np.arange(*ends)
-    gram, count = np.zeros((blocks, regressor.robot.nv, size, size)), np.zeros(blocks)
+    sizes = [len(columns) + len(nodes) for columns in regressor.row_columns]
+    sums, count = [np.zeros((blocks, size, size)) for size in sizes], np.zeros(blocks)
     inputs, _ = regressor.equations.check((motion.q, motion.v, motion.a, motion.tau))
     starts = np.cumsum([0, *(len(columns) + 1 for columns in regressor.row_columns)])
 
@@ -153,7 +155,6 @@ def _sum_one(
             square, inputs, np.array_split(inside, blocks), threads
         ):
             count[block] += equations
-            for joint, columns in enumerate(regressor.row_columns):
-                places = np.append(columns, np.arange(p, size))
-                gram[block, joint, places[:, None], places] += squares[joint]
-    return gram, count
+            for total, own in zip(sums, squares, strict=True):
+                total[block] += own
+    return sums, count

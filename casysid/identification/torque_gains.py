@@ -10,6 +10,7 @@ of time left out better. The common scale cannot be seen without a known mass (G
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -127,11 +128,12 @@ def _search(
 
 def scaled(moments: Moments, gains: Array) -> Moments:
     """Moments of the regressor whose rows are multiplied by ``gains``, shape (joints,)."""
-    factor = np.ones((len(gains), moments.gram.shape[-1]))
-    factor[:, :-1] = gains[:, None]
-    both = factor[:, :, None] * factor[:, None, :]
-    noise = None if moments.noise is None else moments.noise * both
-    return Moments(moments.gram * both, moments.count, moments.columns, moments.joints, noise)
+    factors = [np.append(np.full(len(own), gain), 1.0) for own, gain in zip(moments.row_columns, gains, strict=True)]
+    squares, noise = (
+        None if sums is None else tuple(own * np.outer(f, f) for own, f in zip(sums, factors, strict=True))
+        for sums in (moments.squares, moments.noise)
+    )
+    return dataclasses.replace(moments, squares=squares or (), noise=noise)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,9 +231,12 @@ def _weights(moments: Moments, parameters: Sequence[Parameter]) -> Array:
 def _with_gain_columns(moments: Moments, parameters: Array) -> Moments:
     """Moments with one more column a joint, its torque predicted by ``parameters``, in that joint's rows."""
     dofs, p = len(moments.joints), len(moments.columns)
-    T = np.zeros((dofs, p + 1, p + dofs + 1))
-    T[:, :p, :p], T[:, p, -1] = np.eye(p), 1.0
-    T[np.arange(dofs), :p, p + np.arange(dofs)] = parameters
-    gram = np.swapaxes(T, 1, 2) @ moments.gram @ T
+    squares, rows = [], []
+    for joint in range(dofs):
+        own, sums = moments.of_joint(joint)
+        T = np.zeros((len(own) + 1, len(own) + 2))
+        T[:-1, :-2], T[:-1, -2], T[-1, -1] = np.eye(len(own)), parameters[own], 1.0
+        squares.append(T.T @ sums @ T)
+        rows.append(np.append(own, p + joint))
     names = (*moments.columns, *(f"{dof}.gain" for dof in moments.joints))
-    return Moments(gram, moments.count, names, moments.joints)
+    return Moments(tuple(squares), tuple(rows), moments.count, names, moments.joints)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +10,11 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import RecordingError
+from casysid.readers.table import from_row
+from casysid.recording.source import BATCH
+
+BUFFER = 1 << 18
+"""Bytes that are read at once of each column."""
 
 
 @dataclass(frozen=True)
@@ -32,14 +37,34 @@ class ParquetTable:
         try:
             table = parquet.ParquetFile(self.path).read(columns=list(names))
         except (pa.ArrowException, OSError) as error:
-            raise RecordingError(
-                f"{self.path}: the Parquet file is damaged ({error}); copy or record it again"
-            ) from error
+            raise self._damaged(error) from error
         return {name: self._numbers(name, table.column(name)) for name in names}
+
+    def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
+        """The named columns batch by batch; see :class:`~casysid.readers.table.Table`."""
+        import pyarrow as pa
+        from pyarrow import parquet
+
+        try:
+            # pages are read as they are wanted; a group of rows may be as large as the file
+            with parquet.ParquetFile(self.path, buffer_size=BUFFER, pre_buffer=False) as file:
+                rows = [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)]
+                ends = np.cumsum(rows)
+                groups = np.flatnonzero(ends > first).tolist()
+                skipped = first - (int(ends[groups[0]]) - rows[groups[0]]) if groups else 0
+                read = file.iter_batches(BATCH, row_groups=groups, columns=list(names), use_threads=False)
+                yield from from_row(
+                    ({name: self._numbers(name, batch.column(name)) for name in names} for batch in read), skipped
+                )
+        except (pa.ArrowException, OSError) as error:
+            raise self._damaged(error) from error
 
     def place(self, row: int) -> str:
         """Row, counted from 1."""
         return f"row {row + 1} (the first is row 1)"
+
+    def _damaged(self, error: Exception) -> RecordingError:
+        return RecordingError(f"{self.path}: the Parquet file is damaged ({error}); copy or record it again")
 
     def _numbers(self, name: str, column: object) -> Array:
         import pyarrow as pa
@@ -50,7 +75,7 @@ class ParquetTable:
                 f"{self.path}: column '{name}' holds {kind}, wanted numbers in SI units (time in seconds); "
                 "convert the column and write the file again"
             )
-        return np.asarray(column.cast(pa.float64(), safe=False).to_numpy())  # type: ignore[attr-defined]
+        return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False))  # type: ignore[attr-defined]
 
 
 def open_parquet(path: Path) -> ParquetTable:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -24,6 +24,14 @@ class Table(Protocol):
 
     def read(self, names: Sequence[str]) -> dict[str, Array]:
         """The columns as float64, missing cells as nan, all of one length.
+
+        Raises:
+            RecordingError: If they cannot be read as numbers.
+        """
+        ...
+
+    def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
+        """The same columns from row ``first`` (counted from 0) on, some ten thousand rows at a time.
 
         Raises:
             RecordingError: If they cannot be read as numbers.
@@ -70,3 +78,12 @@ def open_table(path: Path) -> Table:
     raise RecordingError(
         f"{path}: '{suffix or path.name}' is no known kind of log; convert it to one of {', '.join(SUFFIXES)}"
     )
+
+
+def from_row(batches: Iterable[dict[str, Array]], first: int) -> Iterator[dict[str, Array]]:
+    """Batches without the rows before ``first``."""
+    for columns in batches:
+        rows = len(next(iter(columns.values())))
+        if first < rows:
+            yield {name: values[first:] for name, values in columns.items()} if first else columns
+        first = max(first - rows, 0)

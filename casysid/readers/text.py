@@ -11,13 +11,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import RecordingError
+from casysid.readers.table import from_row
 
+BLOCK = 1 << 22
+"""Bytes of text that are read at once: some ten thousand rows."""
 LONGEST_LINE = 1 << 20
 NOT_TEXT = "is not text, though its suffix says so; is it a binary log, or another encoding than UTF-8?"
 
@@ -42,27 +45,57 @@ class TextTable:
 
     def read(self, names: Sequence[str]) -> dict[str, Array]:
         """The named columns; see :class:`~casysid.readers.table.Table`."""
+        from pyarrow import csv as pa_csv
+
+        with self._as_arrow(names) as (stream, options):
+            table = pa_csv.read_csv(stream, *options)
+        return {name: np.asarray(table.column(str(self.names.index(name))).to_numpy()) for name in names}
+
+    def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
+        """The named columns batch by batch; see :class:`~casysid.readers.table.Table`."""
+        from pyarrow import csv as pa_csv
+
+        columns = {name: str(self.names.index(name)) for name in names}
+        with self._as_arrow(names) as (stream, options):
+            read = pa_csv.open_csv(stream, *options)
+            yield from from_row(
+                (
+                    {name: batch.column(column).to_numpy(zero_copy_only=False) for name, column in columns.items()}
+                    for batch in read
+                ),
+                first,
+            )
+
+    @contextmanager
+    def _as_arrow(self, names: Sequence[str]) -> Iterator[tuple[Any, tuple[Any, Any, Any]]]:
+        """The decompressed stream and Arrow's options for the named columns.
+
+        Raises:
+            RecordingError: For what Arrow finds wrong while this is open.
+        """
         import pyarrow as pa
         from pyarrow import csv as pa_csv
 
-        chosen = {name: str(self.names.index(name)) for name in names}
+        chosen = [str(self.names.index(name)) for name in names]
+        options = (
+            pa_csv.ReadOptions(
+                skip_rows=self.header_line,
+                column_names=[str(i) for i in range(len(self.names))],
+                block_size=BLOCK,
+                use_threads=False,
+            ),
+            pa_csv.ParseOptions(delimiter=self.delimiter),
+            pa_csv.ConvertOptions(
+                include_columns=chosen,
+                column_types=dict.fromkeys(chosen, pa.float64()),
+                decimal_point=self.decimal,
+            ),
+        )
         try:
             with pa.input_stream(str(self.path), compression="gzip" if is_gzip(self.path) else None) as stream:
-                table = pa_csv.read_csv(
-                    stream,
-                    pa_csv.ReadOptions(
-                        skip_rows=self.header_line, column_names=[str(i) for i in range(len(self.names))]
-                    ),
-                    pa_csv.ParseOptions(delimiter=self.delimiter),
-                    pa_csv.ConvertOptions(
-                        include_columns=list(chosen.values()),
-                        column_types=dict.fromkeys(chosen.values(), pa.float64()),
-                        decimal_point=self.decimal,
-                    ),
-                )
+                yield stream, options
         except (pa.ArrowInvalid, OSError) as error:
             raise RecordingError(f"{self.path}: {self._fault(names) or error}") from error
-        return {name: np.asarray(table.column(column).to_numpy()) for name, column in chosen.items()}
 
     def place(self, row: int) -> str:
         """Line of the file, counted from 1 as an editor does, comments and blank lines included."""

@@ -9,16 +9,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
 from casysid.errors import RecordingError
 from casysid.readers.angles import angle_joints
 from casysid.readers.columns import listing
-from casysid.recording import Recording
-from casysid.robot import Joint, Robot
-
-Indices = npt.NDArray[np.intp]
+from casysid.readers.statistics import Statistics
+from casysid.robot import Robot
 
 DEGREE = 180.0 / math.pi
 SLOWEST = 1.0  # [s] between samples
@@ -26,16 +21,16 @@ FASTEST = 1e-6  # [s] between samples
 MOST_TURNS = 4.0 * math.pi  # [rad] that need no explanation
 
 
-def check_units(recording: Recording, robot: Robot) -> None:
+def check_units(statistics: Statistics, robot: Robot) -> None:
     """Refuse time stamps that are not seconds and angles that are not radians.
 
     Raises:
         RecordingError: If the evidence leaves no other reading.
     """
-    if recording.time is not None:
-        _check_seconds(recording.label, float(np.median(np.diff(recording.time))))
-    _check_degrees_by_velocity(recording, robot)
-    _check_degrees_by_limits(recording, robot)
+    if statistics.has_time:
+        _check_seconds(statistics.label, statistics.steps.median)
+    _check_degrees_by_velocity(statistics, robot)
+    _check_degrees_by_limits(statistics, robot)
 
 
 def _check_seconds(source: str, step: float) -> None:
@@ -53,10 +48,10 @@ def _check_seconds(source: str, step: float) -> None:
     )
 
 
-def _check_degrees_by_velocity(recording: Recording, robot: Robot) -> None:
+def _check_degrees_by_velocity(statistics: Statistics, robot: Robot) -> None:
     position, velocity = [], []
     for joint in angle_joints(robot):
-        ratio, correlation = travel_over_integral(recording, joint)
+        ratio, correlation = statistics.travel_over_integral(joint, unwrapped=False)
         if correlation > 0.9 and abs(ratio / DEGREE - 1.0) < 0.1:
             position.append(joint.name)
         if correlation > 0.9 and abs(ratio * DEGREE - 1.0) < 0.1:
@@ -67,55 +62,26 @@ def _check_degrees_by_velocity(recording: Recording, robot: Robot) -> None:
     ):
         if names:
             raise RecordingError(
-                f"{recording.label}: {word} looks like degrees for {listing(names)}: "
+                f"{statistics.label}: {word} looks like degrees for {listing(names)}: "
                 f"it is 57.3 times what {other} makes of it. Convert it to {unit} (times pi/180)"
             )
 
 
-def travel_over_integral(recording: Recording, joint: Joint) -> tuple[float, float]:
-    """Ratio of the distance travelled to the integral of the logged velocity of a 1-DOF joint, and their correlation.
-
-    Over stretches of a fiftieth of the recording, none across a gap. (nan, 0) where there is nothing to compare.
-    """
-    if recording.time is None or recording.velocity is None:
-        return math.nan, 0.0
-    q, v = recording.position[:, joint.channels.start], recording.velocity[:, joint.v.start]
-    integral = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(recording.time))])
-    starts, stops = _stretches(recording.segments, max(len(recording) // 50, 1))
-    x, y = integral[stops] - integral[starts], q[stops] - q[starts]
-    xx, yy, xy = float(x @ x), float(y @ y), float(x @ y)
-    if xx <= 0.0 or yy <= 0.0:
-        return math.nan, 0.0
-    return xy / xx, xy / math.sqrt(xx * yy)
-
-
-def _stretches(segments: tuple[slice, ...], length: int) -> tuple[Indices, Indices]:
-    """First and last samples of stretches of ``length`` steps, each overlapping the next by three quarters."""
-    starts, stops = [], []
-    for segment in segments:
-        steps = min(length, segment.stop - segment.start - 1)
-        if steps > 0:
-            first = np.arange(segment.start, segment.stop - steps, max(steps // 4, 1))
-            starts.append(first)
-            stops.append(first + steps)
-    return np.concatenate(starts), np.concatenate(stops)
-
-
-def _check_degrees_by_limits(recording: Recording, robot: Robot) -> None:
-    far = []
+def _check_degrees_by_limits(statistics: Statistics, robot: Robot) -> None:
+    far, positions = [], statistics.positions(unwrapped=False)
     for joint in angle_joints(robot):
         k = joint.channels.start
         low, high = robot.position_lower[k], robot.position_upper[k]
         if not math.isfinite(high - low):
             continue
-        q, slack = recording.position[:, k], 0.1 * (high - low)
-        if q.min() / DEGREE < low - slack or q.max() / DEGREE > high + slack:
+        lowest, highest, slack = positions.low[k], positions.high[k], 0.1 * (high - low)
+        if lowest / DEGREE < low - slack or highest / DEGREE > high + slack:
             return
-        if np.abs(q).max() > max(MOST_TURNS, 3.0 * max(abs(low), abs(high))):
-            far.append(f"{joint.name} ({q.min():.4g} to {q.max():.4g}, limits {low:.4g} to {high:.4g} rad)")
+        if max(-lowest, highest) > max(MOST_TURNS, 3.0 * max(abs(low), abs(high))):
+            far.append(f"{joint.name} ({lowest:.4g} to {highest:.4g}, limits {low:.4g} to {high:.4g} rad)")
     if far:
         raise RecordingError(
-            f"{recording.label}: q looks like degrees: {listing(far, 4)}; "
+            f"{statistics.label}: q looks like degrees: {listing(far, 4)}; "
             "as degrees every joint would be within its limits. Convert q, v and a to radians (times pi/180), "
             "or correct the model's limits"
         )

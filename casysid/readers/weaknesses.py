@@ -9,15 +9,15 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.readers.angles import angle_joints
 from casysid.readers.columns import listing
-from casysid.readers.units import MOST_TURNS, travel_over_integral
-from casysid.recording import Recording
+from casysid.readers.statistics import SINGLE, Statistics
+from casysid.readers.units import MOST_TURNS
 from casysid.robot import Joint, JointKind, Robot
 
 SLOW = 9.0  # [Hz]
 STILL = 5e-3  # [rad, m]: less is friction's play or the encoder's last digits
 
 
-def find_weaknesses(recording: Recording, robot: Robot) -> tuple[str, ...]:
+def find_weaknesses(log: Statistics, robot: Robot) -> tuple[str, ...]:
     """Sentences about what the data leave open or make doubtful; none when there is nothing to say."""
     searches = (
         _gaps,
@@ -32,24 +32,24 @@ def find_weaknesses(recording: Recording, robot: Robot) -> tuple[str, ...]:
         _stuck,
         _repeats,
     )
-    return tuple(sentence for search in searches for sentence in search(recording, robot))
+    return tuple(sentence for search in searches for sentence in search(log, robot))
 
 
-def _gaps(recording: Recording, robot: Robot) -> Iterator[str]:
-    if len(recording.segments) > 1 and recording.time is not None:
-        steps = np.diff(recording.time)
-        largest = int(np.argmax(steps))
+def _gaps(log: Statistics, robot: Robot) -> Iterator[str]:
+    gaps = log.steps.gaps
+    if len(gaps):
+        lengths = gaps[:, 1] - gaps[:, 0]
+        largest = int(np.argmax(lengths))
         yield (
-            f"{len(recording.segments) - 1} gaps in time, the largest {steps[largest]:.4g} s "
-            f"after {recording.time[largest]:.6g} s (the usual step is {np.median(steps):.4g} s); "
+            f"{len(gaps)} gaps in time, the largest {lengths[largest]:.4g} s "
+            f"after {gaps[largest, 0]:.6g} s (the usual step is {log.steps.median:.4g} s); "
             "the stretches between them are smoothed one by one"
         )
 
 
-def _jitter(recording: Recording, robot: Robot) -> Iterator[str]:
-    if recording.time is not None:
-        steps = np.diff(recording.time)
-        low, middle, high = np.quantile(steps, [0.05, 0.5, 0.95])
+def _jitter(log: Statistics, robot: Robot) -> Iterator[str]:
+    if log.has_time:
+        low, middle, high = log.steps.quantiles([0.05, 0.5, 0.95])
         if high - low > 0.2 * middle:
             yield (
                 f"sampling is uneven: nine steps in ten last {low:.3g} to {high:.3g} s; "
@@ -57,16 +57,17 @@ def _jitter(recording: Recording, robot: Robot) -> Iterator[str]:
             )
 
 
-def _slow(recording: Recording, robot: Robot) -> Iterator[str]:
-    if recording.rate < SLOW:
+def _slow(log: Statistics, robot: Robot) -> Iterator[str]:
+    if log.steps.rate < SLOW:
         yield (
-            f"only {recording.rate:.3g} samples a second, too few to follow a robot's motion; "
+            f"only {log.steps.rate:.3g} samples a second, too few to follow a robot's motion; "
             "check that time is in seconds, not milliseconds"
         )
 
 
-def _still_joints(recording: Recording, robot: Robot) -> Iterator[str]:
-    still = [j.name for j in robot.joints if np.ptp(recording.position[:, j.channels], axis=0).max() < STILL]
+def _still_joints(log: Statistics, robot: Robot) -> Iterator[str]:
+    travel = _travel(log)
+    still = [joint.name for joint in robot.joints if travel[joint.channels].max() < STILL]
     if still:
         yield (
             f"never moving (less than {STILL:g} rad or m): {listing(still)}; "
@@ -74,8 +75,14 @@ def _still_joints(recording: Recording, robot: Robot) -> Iterator[str]:
         )
 
 
-def _outside_limits(recording: Recording, robot: Robot) -> Iterator[str]:
-    low, high = recording.position.min(axis=0), recording.position.max(axis=0)
+def _travel(log: Statistics) -> Array:
+    positions = log.positions(unwrapped=True)
+    return np.asarray(positions.high - positions.low)
+
+
+def _outside_limits(log: Statistics, robot: Robot) -> Iterator[str]:
+    positions = log.positions(unwrapped=True)
+    low, high = positions.low, positions.high
     slack = 0.01 * np.nan_to_num(robot.position_upper - robot.position_lower, posinf=0.0)
     outside = (low < robot.position_lower - slack) | (high > robot.position_upper + slack)
     if outside.any():
@@ -87,40 +94,32 @@ def _outside_limits(recording: Recording, robot: Robot) -> Iterator[str]:
         yield f"positions outside the model's limits: {listing(details, 4)}; check the model's zeros and the units of q"
 
 
-def _turns(recording: Recording, robot: Robot) -> Iterator[str]:
+def _turns(log: Statistics, robot: Robot) -> Iterator[str]:
     """Angles without limits that would be many turns as radians, unless their speed is one that the model allows."""
-    many = []
+    many, positions = [], log.positions(unwrapped=True)
     for joint in angle_joints(robot):
-        k, reach = joint.channels.start, np.abs(recording.position[:, joint.channels]).max()
+        k = joint.channels.start
+        reach = max(-positions.low[k], positions.high[k])
         limited = np.isfinite(robot.position_upper[k] - robot.position_lower[k])
-        if not limited and reach > MOST_TURNS and not _slow_enough(recording, robot, joint):
+        if not limited and reach > MOST_TURNS and not _slow_enough(log, robot, joint):
             many.append(f"{joint.name} (up to {reach:.4g})")
     if many:
         yield f"{listing(many)}: many turns in radians, or degrees? The model sets no limits to tell; convert degrees"
 
 
-def _slow_enough(recording: Recording, robot: Robot, joint: Joint) -> bool:
-    limit = float(robot.velocity_limit[joint.v.start])
-    speed = _step_speed(recording, joint)
-    return len(speed) > 0 and np.isfinite(limit) and float(np.quantile(speed, 0.99)) <= limit
+def _slow_enough(log: Statistics, robot: Robot, joint: Joint) -> bool:
+    """Whether no more than one step in a hundred is faster than the joint's limit."""
+    fast = log.positions(unwrapped=True).fast[joint.channels.start]
+    return bool(log.steps.count and np.isfinite(robot.velocity_limit[joint.v.start]) and fast <= 0.01 * log.steps.count)
 
 
-def _step_speed(recording: Recording, joint: Joint) -> Array:
-    """Speed from each sample to the next of a 1-DOF joint; empty without time."""
-    if recording.time is None:
-        return np.empty(0)
-    return np.abs(np.diff(recording.position[:, joint.channels.start])) / np.diff(recording.time)
-
-
-def _jumps(recording: Recording, robot: Robot) -> Iterator[str]:
-    details = []
-    for joint in (j for j in robot.joints if j.kind in _SINGLE and np.isfinite(robot.velocity_limit[j.v.start])):
-        speed = _step_speed(recording, joint)
-        jumps = np.flatnonzero(speed > 10.0 * robot.velocity_limit[joint.v.start])
-        if len(jumps) and recording.time is not None:
-            details.append(
-                f"{joint.name} in {len(jumps)} of {len(speed)} steps, first at {recording.time[jumps[0] + 1]:.6g} s"
-            )
+def _jumps(log: Statistics, robot: Robot) -> Iterator[str]:
+    positions = log.positions(unwrapped=True)
+    details = [
+        f"{robot.channels[k]} in {positions.jumps[k]} of {log.steps.count} steps, "
+        f"first at {positions.first_jump[k]:.6g} s"
+        for k in np.flatnonzero(positions.jumps)
+    ]
     if details:
         yield (
             f"positions jump, faster than ten times the velocity limit: {listing(details, 4)}; "
@@ -128,26 +127,22 @@ def _jumps(recording: Recording, robot: Robot) -> Iterator[str]:
         )
 
 
-_SINGLE = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
-
-
-def _velocity_mismatch(recording: Recording, robot: Robot) -> Iterator[str]:
-    details = []
-    for joint in (j for j in robot.joints if j.kind in _SINGLE):
-        ratio, correlation = travel_over_integral(recording, joint)
-        moves = np.ptp(recording.position[:, joint.channels.start]) >= STILL
+def _velocity_mismatch(log: Statistics, robot: Robot) -> Iterator[str]:
+    details, travel = [], _travel(log)
+    for joint in (j for j in robot.joints if j.kind in SINGLE):
+        ratio, correlation = log.travel_over_integral(joint, unwrapped=True)
+        moves = travel[joint.channels.start] >= STILL
         if moves and np.isfinite(ratio) and not (0.8 < ratio < 1.25 and correlation > 0.8):
             details.append(f"{joint.name} (ratio {ratio:.3g}, correlation {correlation:.2g})")
     if details:
         yield f"the logged v is not the rate of change of q for {listing(details, 4)}; check sign, unit and joint order"
 
 
-def _saturation(recording: Recording, robot: Robot) -> Iterator[str]:
-    magnitude = np.abs(recording.torque)
-    count = (magnitude >= 0.999 * robot.effort_limit).sum(axis=0)
+def _saturation(log: Statistics, robot: Robot) -> Iterator[str]:
+    count, largest = log.saturated, np.maximum(-log.torque_low, log.torque_high)
     details = [
-        f"{robot.dofs[k]} in {count[k]} rows (up to {magnitude[:, k].max():.4g}, limit {robot.effort_limit[k]:.4g})"
-        for k in np.flatnonzero(count > 0.001 * len(recording))
+        f"{robot.dofs[k]} in {count[k]} rows (up to {largest[k]:.4g}, limit {robot.effort_limit[k]:.4g})"
+        for k in np.flatnonzero(count > 0.001 * log.samples)
     ]
     if details:
         yield (
@@ -156,19 +151,18 @@ def _saturation(recording: Recording, robot: Robot) -> Iterator[str]:
         )
 
 
-def _stuck(recording: Recording, robot: Robot) -> Iterator[str]:
+def _stuck(log: Statistics, robot: Robot) -> Iterator[str]:
     base = {k for j in robot.joints if j.kind is JointKind.FREE_FLYER for k in range(j.v.start, j.v.stop)}
-    stuck = [d for k, d in enumerate(robot.dofs) if k not in base and np.ptp(recording.torque[:, k]) == 0.0]
+    constant = log.torque_low == log.torque_high
+    stuck = [dof for k, dof in enumerate(robot.dofs) if k not in base and constant[k]]
     if stuck:
         yield f"torque of {listing(stuck)} is the same in every row: not measured, so it says nothing about that joint"
 
 
-def _repeats(recording: Recording, robot: Robot) -> Iterator[str]:
-    if recording.time is not None:
-        same = [(x[1:] == x[:-1]).all(axis=1) for x in (recording.position, recording.torque)]
-        share = float(np.logical_and(*same).mean())
-        if share > 0.05:
-            yield (
-                f"{share:.0%} of the rows repeat the one before; the log is faster than the robot's measurements, "
-                "so decimate it to the true rate"
-            )
+def _repeats(log: Statistics, robot: Robot) -> Iterator[str]:
+    share = log.repeats / max(log.steps.count, 1)
+    if share > 0.05:
+        yield (
+            f"{share:.0%} of the rows repeat the one before; the log is faster than the robot's measurements, "
+            "so decimate it to the true rate"
+        )

@@ -6,10 +6,10 @@ from casysid.dynamics import build_regressor
 from casysid.identifiability import structural_base_parameters
 from casysid.identification.mistakes import find_mistakes
 from casysid.inertia import mass_properties, smallest_eigenvalue
-from casysid.recording import Recording
+from casysid.recording import Source
 from casysid.report.tables import Table, mistake_table, number
 from casysid.robot import Robot
-from casysid.signals import motion_band, position_noise
+from casysid.signals import band_of, noise_of
 from casysid.threads import single_threaded
 
 
@@ -20,7 +20,7 @@ def robot_tables(robot: Robot) -> list[tuple[str, Table]]:
 
 
 @single_threaded()
-def recording_tables(robot: Robot, recording: Recording) -> list[tuple[str, Table]]:
+def recording_tables(robot: Robot, recording: Source) -> list[tuple[str, Table]]:
     """What is in a recording, and how each channel moves."""
     summary = recording.summary()
     rows = [
@@ -39,8 +39,8 @@ def recording_tables(robot: Robot, recording: Recording) -> list[tuple[str, Tabl
     ]
 
 
-def _against_file(robot: Robot, recording: Recording) -> Table:
-    mistakes = find_mistakes(robot, [recording])
+def _against_file(robot: Robot, recording: Source) -> Table:
+    mistakes = find_mistakes(robot, recording.excerpts())
     return mistake_table(mistakes) if mistakes else Table(("",), (("nothing looks wrong",),))
 
 
@@ -85,7 +85,7 @@ def _combinations(robot: Robot) -> Table:
     return Table(("",), tuple((line,) for line in base.words()))
 
 
-def _channels(recording: Recording) -> Table:
+def _channels(recording: Source) -> Table:
     summary = recording.summary()
     header = ["channel", "lowest", "highest"]
     columns = [
@@ -93,10 +93,10 @@ def _channels(recording: Recording) -> Table:
         [number(low) for low, _ in summary.position_range.values()],
         [number(high) for _, high in summary.position_range.values()],
     ]
-    if recording.time is not None:
+    if recording.has_time:
         header += ["motion up to [Hz]", "noise (std)"]
-        columns.append([number(float(f), 3) for f in motion_band(recording.time, recording.position)])
-        columns.append([number(float(s), 3) for s in position_noise(recording.time, recording.position)])
+        columns.append([number(float(f), 3) for f in band_of(recording.spectrum)])
+        columns.append([number(float(s), 3) for s in noise_of(recording.spectrum)])
     if recording.channels == recording.dofs:
         header += ["torque RMS", "torque peak"]
         columns += [[number(x, 3) for x in values.values()] for values in (summary.torque_rms, summary.torque_peak)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+import numpy.typing as npt
 from scipy.interpolate import make_interp_spline
 
 from casysid.arrays import Array
@@ -49,3 +50,20 @@ def aligned(recording: Recording, delays: Array) -> Recording:
             f"{1e3 * np.ptp(delays):.3g} ms"
         )
     return dataclasses.replace(recording, torque=torque, torque_delay=total).selected(rows)
+
+
+def moved_torque(time: Array, torque: Array, delays: Array, rows: npt.NDArray[np.intp]) -> Array:
+    """Torques at some rows, each joint's looked up ``delays`` later [s], shape (rows, dofs).
+
+    Args:
+        time: [s], shape (N,).
+        torque: At these times, shape (N, dofs).
+        delays: By degree of freedom [s], shape (dofs,).
+        rows: Which; moved by any of the delays, they lie within ``time``.
+    """
+    if not delays.any():
+        return np.asarray(torque[rows])
+    moved = np.array(torque[rows])
+    for joint in np.flatnonzero(np.abs(delays) > ROUNDING):
+        moved[:, joint] = make_interp_spline(time, torque[:, joint], k=DEGREE)(time[rows] + delays[joint])
+    return moved

@@ -20,6 +20,7 @@ from scipy import sparse
 from scipy.interpolate import BSpline
 
 from casysid.arrays import Array
+from casysid.recording import Stretch
 
 SPACING = 0.32
 """Of the windows, in periods of the cut-off: ``sinc(0.32)⁴ = 1/2``."""
@@ -89,6 +90,52 @@ class BandAverage:
         windows = max(int(np.ceil(span * self.cutoff / SPACING)), 1)
         spacing = max(span, 1e-12) / windows
         return np.asarray(time[0] + spacing * np.arange(-DEGREE, windows + DEGREE + 1))
+
+
+def window_reach(cutoff: float) -> float:
+    """How far from its middle a window reaches at most [s]."""
+    return 0.5 * (DEGREE + 1) * SPACING / cutoff
+
+
+class PieceWindows(NamedTuple):
+    """Windows over a piece of a stretch.
+
+    Attributes:
+        weights: Sparse, shape (windows, samples); rows sum to one.
+        middle: Of each window [s], shape (windows,).
+    """
+
+    weights: Any
+    middle: Array
+
+
+def piece_windows(time: Array, own: tuple[float, float], stretch: Stretch, cutoff: float, rate: float) -> PieceWindows:
+    """The windows of a whole stretch whose middles lie in a piece's own time; together, pieces have each window once.
+
+    Args:
+        time: Samples of the piece, and those beside as far as :func:`window_reach`, [s], shape (N,).
+        own: The piece's own time [s]: windows from the first moment up to before the second.
+        stretch: All of it.
+        cutoff: Frequency of half gain [Hz].
+        rate: Usual samples per second, [Hz]: a window with less than a fifth of their weight is left out.
+    """
+    span = max(stretch.stop - stretch.start, 1e-12)
+    count = max(int(np.ceil(span * cutoff / SPACING)), 1)
+    spacing = span / count
+    middles: Array = np.asarray(stretch.start + spacing * np.arange(-1, count + 2))
+    first, last = np.searchsorted(middles, own)
+    knots = stretch.start + spacing * np.arange(first - 2 * DEGREE, last + DEGREE + 1)
+    begin, end = np.searchsorted(time, (knots[DEGREE], knots[-DEGREE - 1]), side="left")
+    if last <= first or end <= begin:
+        return PieceWindows(sparse.csr_array((0, len(time))), np.empty(0))
+    reached = BSpline.design_matrix(time[begin:end], knots, DEGREE).T.tocsr()[DEGREE : DEGREE + last - first]
+    total = np.asarray(reached.sum(axis=1)).ravel()
+    kept = total > SMALLEST_SHARE * rate * spacing
+    few = (sparse.diags_array(1.0 / total[kept]) @ reached[kept]).tocsr()
+    shape = (few.shape[0], len(time))
+    return PieceWindows(
+        sparse.csr_array((few.data, few.indices + begin, few.indptr), shape=shape), middles[first:last][kept]
+    )
 
 
 @dataclass(frozen=True, eq=False)

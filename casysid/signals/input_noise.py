@@ -10,7 +10,8 @@ import numpy as np
 from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError
 from casysid.recording import Recording
-from casysid.signals.noise import noise_level_error, position_noise, position_resolution
+from casysid.recording.resolution import position_resolution
+from casysid.signals.noise import noise_level_error, position_noise
 from casysid.threads import single_threaded
 
 GIVEN, SPECTRUM = "given", "spectrum of the positions"

@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from casysid.arrays import Array, frozen
 from casysid.errors import RecordingError
-from casysid.recording import Recording
+from casysid.recording import BATCH, GAP, Recording, Source, Stretch
+from casysid.recording.pieces import Piece, pieces
 from casysid.robot import Robot
 from casysid.robot.coordinates import configuration_from_channels, state_from_channels
-from casysid.signals.noise import position_noise
-from casysid.signals.smoothing import Smoother, build_smoother
+from casysid.signals.alignment import moved_torque
+from casysid.signals.noise import noise_of, smoothed_noise, speed_of
+from casysid.signals.smoothing import Grid, build_smoother, memory
 from casysid.signals.standstill import standing
 from casysid.threads import single_threaded
 
 MINIMUM_SAMPLES = 8
-LONGEST_RESPONSE = 4096
-GAP_IN_STEPS = 5.0
+LONGEST_BRIDGE = 0.5
+"""Holes of no more than so many periods of the cut-off are bridged by the spline. In the middle of one so long, a
+motion at a quarter of the cut-off is off by 1e-5 of its acceleration (``tests/signals/test_pieces.py``)."""
 SETTLING = 1.0
 """So many periods of the cut-off from an end, the spline is as good as anywhere: what an end does to it falls to
 ``exp(-π)`` in one."""
@@ -92,41 +96,111 @@ class Motion:
         )
 
 
+class MotionScales(NamedTuple):
+    """What tells a stand from a motion: figures of a whole recording.
+
+    Attributes:
+        noise: Standard deviation of position noise by channel, shape (channels,).
+        speed: Root mean square velocity by channel, shape (channels,).
+    """
+
+    noise: Array
+    speed: Array
+
+
+class MotionPiece(NamedTuple):
+    """The motion of some consecutive samples of one stretch of time.
+
+    Attributes:
+        motion: Of the piece's own samples, and of those beside them as far as was asked for.
+        core: Which of its rows are its own: the cores of all pieces have every sample with a motion once.
+        own: The piece's own time [s], from the first moment up to before the second; infinite at a stretch's ends.
+        stretch: All of the stretch.
+    """
+
+    motion: Motion
+    core: slice
+    own: tuple[float, float]
+    stretch: Stretch
+
+
+def longest_bridge(cutoff: float, step: float) -> float:
+    """Longer steps of time are gaps for a low-pass at ``cutoff`` [Hz], where steps are usually ``step`` [s], [s]."""
+    return max(LONGEST_BRIDGE / cutoff, GAP * step)
+
+
+def motion_pieces(
+    robot: Robot,
+    source: Source,
+    cutoff: float | None,
+    *,
+    window: float = 0.0,
+    gap: float | None = None,
+    delays: Array | None = None,
+    rows: int = BATCH,
+    multiple: int = 1,
+    scales: MotionScales | None = None,
+) -> Iterator[MotionPiece]:
+    """The motion of a recording of any length piece by piece: the same, to rounding, as if it were smoothed as a whole.
+
+    Every piece is smoothed with so many samples beside it that the spline has forgotten where they end
+    (:func:`~casysid.signals.smoothing.memory`). A stand that goes on beyond those is judged by the part that is seen.
+
+    Args:
+        robot: The robot.
+        source: The recording.
+        cutoff: Of the smoothing [Hz]; None, or a recording without time, takes the samples as logged.
+        window: So much of the motion before and after the core is wanted too [s].
+        gap: Longer steps of time part stretches [s]; None: :func:`longest_bridge`.
+        delays: By which each degree of freedom's torque is late beside ``source.torque_delay`` [s], shape (nv,).
+        rows: Of a core, about.
+        multiple: The number of rows in a core is a multiple of it, but for a stretch's last.
+        scales: For stands; None takes them from the source's spectrum.
+    """
+    if cutoff is None or not source.has_time:
+        yield from _pieces_as_logged(robot, source, rows)
+        return
+    own_delays = np.zeros(robot.nv) if delays is None else delays
+    latest = max(abs(source.torque_delay), float(np.abs(source.torque_delay + own_delays).max()))
+    overlap = memory(cutoff) + latest + window
+    gap = longest_bridge(cutoff, source.step) if gap is None else gap
+    scales = scales or MotionScales(noise_of(source.spectrum), speed_of(source.spectrum))
+    maker = _MotionMaker(robot, source, cutoff, scales, own_delays)
+    for piece in pieces(source, overlap, rows=rows, gap=gap, multiple=multiple):
+        if piece.stretch.rows.stop - piece.stretch.rows.start >= MINIMUM_SAMPLES:
+            made = maker.make(piece, window)
+            if made is not None:
+                yield made
+
+
 @single_threaded()
-def motion_from_recording(robot: Robot, recording: Recording, cutoff: float | None) -> Motion:
+def motion_from_recording(robot: Robot, recording: Source, cutoff: float | None, gap: float | None = None) -> Motion:
     """The recording's positions smoothed at ``cutoff`` [Hz] and differentiated; each stretch between gaps by itself.
 
     Motion is taken ``recording.torque_delay`` earlier than the torque's time stamp, as it was when the torque acted.
+    A gap is a step of time longer than ``gap`` [s]; None: :func:`longest_bridge`.
 
     Unordered samples (no time), and timed ones with ``cutoff`` None that carry velocity and acceleration, are taken as
     logged. Logged velocities are otherwise not used: the spline's derivatives of the position are consistent with it.
+
+    Raises:
+        RecordingError: Samples to be taken as logged lack velocity or acceleration, or no stretch is long enough.
     """
-    if recording.time is None or cutoff is None:
-        return _as_logged(robot, recording)
-    pieces = [piece for piece in recording.segments if piece.stop - piece.start >= MINIMUM_SAMPLES]
-    wanted = [_rows_with_motion(recording, piece) for piece in pieces]
-    smoothers = [build_smoother(recording.time[piece], cutoff) for piece in pieces]
-    smoothed = [
-        _smooth_piece(robot, recording, smoother, piece, rows)
-        for smoother, piece, rows in zip(smoothers, pieces, wanted, strict=True)
-    ]
-    q, v, a = (np.concatenate([piece[k] for piece in smoothed]) for k in range(3))
-    rows = np.concatenate(wanted)
-    smoother, longest = max(zip(smoothers, pieces, strict=True), key=lambda pair: len(pair[0].time))
-    noise = position_noise(recording.time[longest], recording.position[longest])
-    return Motion(
-        time=recording.time[rows],
-        q=q,
-        v=v,
-        a=a,
-        tau=recording.torque[rows],
-        velocity_noise=_velocity_noise(robot, smoother, noise),
-        standing=_standing(robot, recording, pieces, wanted, noise, v, cutoff),
-        settled=np.concatenate(
-            [_settled(recording, piece, rows, cutoff) for piece, rows in zip(pieces, wanted, strict=True)]
-        ),
-        cutoff=cutoff,
-    )
+    parts = [piece.motion for piece in motion_pieces(robot, recording, cutoff, gap=gap, rows=max(len(recording), 1))]
+    if not parts:
+        raise RecordingError(
+            f"{recording.label}: no {MINIMUM_SAMPLES} samples between gaps in time, so nothing can be differentiated"
+        )
+    return joined_motions(parts)
+
+
+def joined_motions(parts: list[Motion]) -> Motion:
+    """Consecutive motions as one."""
+    if len(parts) == 1:
+        return parts[0]
+    names = ("time", "q", "v", "a", "tau", "standing", "settled")
+    together: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return dataclasses.replace(parts[0], **together)
 
 
 @single_threaded()
@@ -142,11 +216,19 @@ def low_passed(time: Array, values: Array, cutoff: float) -> Array:
 def stretches(time: Array) -> list[npt.NDArray[np.intp]]:
     """Indices of the samples between gaps in time."""
     steps = np.diff(time)
-    gaps = np.flatnonzero(steps > GAP_IN_STEPS * np.median(steps)) + 1
+    gaps = np.flatnonzero(steps > GAP * np.median(steps)) + 1
     return np.split(np.arange(len(time)), gaps)
 
 
-def _as_logged(robot: Robot, recording: Recording) -> Motion:
+def _pieces_as_logged(robot: Robot, source: Source, rows: int) -> Iterator[MotionPiece]:
+    first, stretch = 0, Stretch(slice(0, len(source)), source.start, source.stop)
+    for batch in source.batches(rows):
+        own = (batch.start if first else -np.inf, np.inf)
+        yield MotionPiece(_as_logged(robot, batch, first), slice(0, len(batch)), own, stretch)
+        first += len(batch)
+
+
+def _as_logged(robot: Robot, recording: Recording, first: int) -> Motion:
     if recording.velocity is None or recording.acceleration is None:
         raise RecordingError(
             f"{recording.label}: samples without a low-pass need velocity and acceleration in the log; add v_ and a_ "
@@ -154,7 +236,7 @@ def _as_logged(robot: Robot, recording: Recording) -> Motion:
         )
     count = len(recording.torque)
     return Motion(
-        time=np.arange(count, dtype=np.float64) if recording.time is None else recording.time,
+        time=np.arange(first, first + count, dtype=np.float64) if recording.time is None else recording.time,
         q=configuration_from_channels(robot, recording.position),
         v=recording.velocity,
         a=recording.acceleration,
@@ -166,69 +248,85 @@ def _as_logged(robot: Robot, recording: Recording) -> Motion:
     )
 
 
-def _rows_with_motion(recording: Recording, piece: slice) -> npt.NDArray[np.intp]:
-    """Samples of a stretch whose torque belongs to a motion within it."""
-    assert recording.time is not None
-    time, rows = recording.time[piece], np.arange(piece.start, piece.stop)
-    moved = time - recording.torque_delay
-    return np.asarray(rows[(moved >= time[0]) & (moved <= time[-1])])
+class _MotionMaker:
+    """Makes the motion of pieces of one recording."""
 
+    def __init__(self, robot: Robot, source: Source, cutoff: float, scales: MotionScales, own_delays: Array) -> None:
+        self._robot, self._cutoff, self._scales, self._own_delays = robot, cutoff, scales, own_delays
+        self._rate, self._step, self._delay = source.rate, source.step, source.torque_delay
+        self._rates, self._channels = _single_channels(robot)
+        self._velocity_noise = np.zeros(robot.nv)
+        gain = smoothed_noise(cutoff, self._rate, 1)
+        self._velocity_noise[self._rates] = gain * scales.noise[self._channels]
 
-def _smooth_piece(
-    robot: Robot, recording: Recording, smoother: Smoother, piece: slice, rows: npt.NDArray[np.intp]
-) -> tuple[Array, Array, Array]:
-    assert recording.time is not None
-    at = recording.time[rows] - recording.torque_delay if recording.torque_delay else None
-    return state_from_channels(robot, *smoother.states(recording.position[piece], at))
+    def make(self, piece: Piece, window: float) -> MotionPiece | None:
+        """Of the core and of ``window`` seconds beside it; None if none of that has a motion within the stretch."""
+        recording, core, stretch = piece.recording, piece.core, piece.stretch
+        assert recording.time is not None
+        time = recording.time
+        own = self._own_time(piece, time)
+        wanted = slice(
+            int(np.searchsorted(time, time[core.start] - window)),
+            int(np.searchsorted(time, time[core.stop - 1] + window, side="right")),
+        )
+        within = self._within(time, stretch)
+        rows = np.arange(wanted.start, wanted.stop)
+        rows = rows[within[wanted]]
+        if not len(rows):
+            return None
+        moved = time[rows] - self._delay
+        smoother = build_smoother(time, self._cutoff, grid=Grid(stretch.start, stretch.stop, self._step))
+        states = smoother.states(recording.position, moved if self._delay else time[rows])
+        q, v, a = state_from_channels(self._robot, *states)
+        motion = Motion(
+            time=time[rows],
+            q=q,
+            v=v,
+            a=a,
+            tau=moved_torque(time, recording.torque, self._own_delays, rows),
+            velocity_noise=self._velocity_noise,
+            standing=self._standing(recording, time, moved),
+            settled=self._settled(moved, stretch),
+            cutoff=self._cutoff,
+        )
+        mine = slice(int(np.searchsorted(rows, core.start)), int(np.searchsorted(rows, core.stop)))
+        return MotionPiece(motion, mine, own, stretch)
 
+    @staticmethod
+    def _own_time(piece: Piece, time: Array) -> tuple[float, float]:
+        rows = piece.stretch.rows
+        last = piece.first + piece.core.stop - piece.core.start
+        return (
+            -np.inf if piece.first == rows.start else float(time[piece.core.start]),
+            np.inf if last == rows.stop else float(time[piece.core.stop]),
+        )
 
-def _settled(recording: Recording, piece: slice, rows: npt.NDArray[np.intp], cutoff: float) -> npt.NDArray[np.bool_]:
-    """Which samples' motion is away from both ends of its stretch."""
-    assert recording.time is not None
-    time, moved = recording.time[piece], recording.time[rows] - recording.torque_delay
-    end = min(SETTLING / cutoff, LARGEST_END * (time[-1] - time[0]))
-    return np.asarray((moved >= time[0] + end) & (moved <= time[-1] - end))
+    def _within(self, time: Array, stretch: Stretch) -> npt.NDArray[np.bool_]:
+        """Which samples' torque belongs to a motion within the stretch, and every joint's is within it at that time."""
+        moved = time - self._delay
+        earliest, latest = min(self._own_delays.min(), 0.0), max(self._own_delays.max(), 0.0)
+        inside = (moved >= stretch.start) & (moved <= stretch.stop)
+        return np.asarray(inside & (time + earliest >= stretch.start) & (time + latest <= stretch.stop))
 
+    def _settled(self, moved: Array, stretch: Stretch) -> npt.NDArray[np.bool_]:
+        """Which samples' motion is away from both ends of its stretch."""
+        end = min(SETTLING / self._cutoff, LARGEST_END * (stretch.stop - stretch.start))
+        return np.asarray((moved >= stretch.start + end) & (moved <= stretch.stop - end))
 
-def _velocity_noise(robot: Robot, smoother: Smoother, channel_noise: Array) -> Array:
-    """Noise of the smoothed velocity of each degree of freedom, for joints with one channel each."""
-    if len(smoother.time) > LONGEST_RESPONSE:
-        smoother = build_smoother(smoother.time[:LONGEST_RESPONSE], smoother.cutoff)
-    gain = np.sqrt(smoother.noise_covariance()[1, 1])
-    noise = np.zeros(robot.nv)
-    rates, channels = _single_channels(robot)
-    noise[rates] = gain * channel_noise[channels]
-    return noise
-
-
-def _standing(
-    robot: Robot,
-    recording: Recording,
-    pieces: Sequence[slice],
-    wanted: Sequence[npt.NDArray[np.intp]],
-    channel_noise: Array,
-    v: Array,
-    cutoff: float,
-) -> npt.NDArray[np.bool_]:
-    """Stands of the joints with one channel each; no window of the search is longer than a period of the cut-off."""
-    rates, channels = _single_channels(robot)
-    speed = np.sqrt(np.mean(v[:, rates] ** 2, axis=0))
-    stands = np.zeros(v.shape, dtype=bool)
-    found = [
-        standing(recording.position[piece, channels], recording.rate, channel_noise[channels], speed, 1.0 / cutoff)
-        for piece in pieces
-    ]
-    at = [_samples_of_motion(recording, piece, rows) for piece, rows in zip(pieces, wanted, strict=True)]
-    stands[:, rates] = np.concatenate([still[rows] for still, rows in zip(found, at, strict=True)])
-    return stands
-
-
-def _samples_of_motion(recording: Recording, piece: slice, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-    """The samples of a stretch nearest to the motion that belongs to the torque of ``rows``."""
-    assert recording.time is not None
-    time = recording.time[piece]
-    number = np.interp(recording.time[rows] - recording.torque_delay, time, np.arange(len(time)))
-    return np.asarray(np.rint(number).astype(np.intp))
+    def _standing(self, recording: Recording, time: Array, moved: Array) -> npt.NDArray[np.bool_]:
+        """Stands of joints with one channel; no window of the search is longer than a period of the cut-off."""
+        channels = self._channels
+        stands = np.zeros((len(moved), self._robot.nv), dtype=bool)
+        found = standing(
+            recording.position[:, channels],
+            self._rate,
+            self._scales.noise[channels],
+            self._scales.speed[channels],
+            1.0 / self._cutoff,
+        )
+        nearest = np.rint(np.interp(moved, time, np.arange(len(time)))).astype(np.intp)
+        stands[:, self._rates] = found[nearest]
+        return stands
 
 
 def _single_channels(robot: Robot) -> tuple[list[int], list[int]]:

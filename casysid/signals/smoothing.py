@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -24,6 +24,8 @@ from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError
 
 KNOTS_PER_CUTOFF_PERIOD = 6
+TOLERANCE = 1e-10
+"""Of an effect that is forgotten: a tenth of what results are held to, 1e-9, since derivatives forget less."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -55,8 +57,10 @@ class Smoother:
 
     def states(self, values: Array, at: Array | None = None) -> tuple[Array, Array, Array]:
         """The smoothed ``values``, their first and second derivatives, as :meth:`smooth` gives them one by one."""
-        coefficients = self._coefficients(values)
-        value, rate, second = (np.asarray(self._basis_at(k, at) @ coefficients) for k in range(3))
+        degree, time = 2 * self.order - 1, self.time if at is None else at
+        spline = BSpline.construct_fast(self._knots, self._coefficients(values), degree)
+        inside = np.clip(time, self._knots[degree], self._knots[-degree - 1])
+        value, rate, second = (np.asarray(spline(inside, nu=k)) for k in range(3))
         return value, rate, second
 
     def _coefficients(self, values: Array) -> Array:
@@ -85,8 +89,34 @@ class Smoother:
         return responses @ responses.T
 
 
-def build_smoother(time: Array, cutoff: float, order: int = 3) -> Smoother:
+class Grid(NamedTuple):
+    """What smoothers of parts of a stretch of time have in common, so that they are parts of one spline.
+
+    Attributes:
+        start: First sample of the stretch [s].
+        stop: Last sample of it [s].
+        step: Usual step between samples [s].
+    """
+
+    start: float
+    stop: float
+    step: float
+
+
+def memory(cutoff: float, tolerance: float = TOLERANCE) -> float:
+    """How far from a sample its effect on the spline falls to ``tolerance`` of what it is there [s].
+
+    The poles of the gain next to the real axis are ``ω_c e^{±iπ/2d}``, for order 3 with an imaginary part of
+    ``ω_c / 2``: an effect falls by ``exp(-π)`` in a period of the cut-off.
+    """
+    return float(-np.log(tolerance) / np.pi / cutoff)
+
+
+def build_smoother(time: Array, cutoff: float, order: int = 3, grid: Grid | None = None) -> Smoother:
     """A smoother for samples at ``time`` [s] with the given cut-off [Hz].
+
+    With a grid, a part of a stretch gets knots and penalty of the whole, and so the same spline but for its ends, whose
+    effect is gone after :func:`memory`.
 
     Raises:
         ParameterError: Times do not increase, fewer samples than ``order + 1``, or a cut-off that is not positive and
@@ -100,8 +130,9 @@ def build_smoother(time: Array, cutoff: float, order: int = 3) -> Smoother:
     steps = np.diff(time)
     if not (steps > 0).all():
         raise ParameterError(f"smoother: times must increase; they do not after sample {int(np.argmin(steps > 0)) + 1}")
-    degree, step = 2 * order - 1, float(np.median(steps))
-    knots, spacing = _knots(time, max(1.0 / (KNOTS_PER_CUTOFF_PERIOD * cutoff), step), degree)
+    grid = grid or Grid(float(time[0]), float(time[-1]), float(np.median(steps)))
+    degree, step = 2 * order - 1, grid.step
+    knots, spacing = _knots(time, grid, max(1.0 / (KNOTS_PER_CUTOFF_PERIOD * cutoff), step), degree)
     basis = derivative_basis(time, knots, degree, 0)
     normal = basis.T @ basis
     banded = (2.0 * np.pi * cutoff) ** (-2 * order) / step * _roughness(normal.shape[0], order, spacing)
@@ -117,11 +148,13 @@ def build_smoother(time: Array, cutoff: float, order: int = 3) -> Smoother:
     )
 
 
-def _knots(time: Array, wanted_spacing: float, degree: int) -> tuple[Array, float]:
-    """Evenly spaced knots over the samples and ``degree`` more on either side, with their spacing."""
-    intervals = max(int(np.ceil((time[-1] - time[0]) / wanted_spacing)), 1)
-    spacing = (time[-1] - time[0]) / intervals
-    return time[0] + spacing * np.arange(-degree, intervals + degree + 1), spacing
+def _knots(time: Array, grid: Grid, wanted_spacing: float, degree: int) -> tuple[Array, float]:
+    """The grid's evenly spaced knots about the samples, ``degree`` more on either side, and their spacing."""
+    intervals = max(int(np.ceil((grid.stop - grid.start) / wanted_spacing)), 1)
+    spacing = (grid.stop - grid.start) / intervals
+    first = min(max(int(np.floor((time[0] - grid.start) / spacing)), 0), intervals - 1)
+    last = max(min(int(np.ceil((time[-1] - grid.start) / spacing)), intervals), first + 1)
+    return np.asarray(grid.start + spacing * np.arange(first - degree, last + degree + 1)), spacing
 
 
 def derivative_basis(time: Array, knots: Array, degree: int, derivative: int) -> Any:

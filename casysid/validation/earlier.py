@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from casysid.dynamics import FrictionModel
 from casysid.errors import ParameterError
-from casysid.identification.friction_model import FrictionModel, model_from_json
+from casysid.identification.friction_model import model_from_json
 
 Drives = Mapping[str, Mapping[str, float | None]]
 """Friction and armature by joint and kind, as in a ``result.json``."""

@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.dynamics import DEFAULT_FRICTION, Coupling, Regressor, build_regressor
+from casysid.dynamics import DEFAULT_FRICTION, Coupling, FrictionModel, Regressor, build_regressor
 from casysid.errors import ParameterError
 from casysid.identification import CutoffChoice, Settings, TorqueError, choose_cutoff, torque_error
-from casysid.identification.friction_model import FrictionModel
 from casysid.identification.problem import USUAL_WIDTH, make_motion, with_widths
 from casysid.recording import Recording
 from casysid.robot import Robot

@@ -12,7 +12,6 @@ from casysid.dynamics import Regressor, build_regressor
 from casysid.estimation.covariance import block_covariance
 from casysid.identification import IdentificationResult
 from casysid.identification.problem import sum_moments
-from casysid.moments import Moments
 from casysid.simulation import Plant, SimulatedRun
 from casysid.threads import single_threaded
 
@@ -77,13 +76,7 @@ def compare_base_parameters(result: IdentificationResult, plant: Plant) -> BaseC
     """An identification's base parameters beside those of the plant it was made on."""
     base, regressor = result.structural, result.regressor
     moments = sum_moments(regressor, result.train_motions, result.cutoff.cutoff, result.settings)
-    chosen = np.append(base.independent, len(regressor.names))
-    leading = Moments(  # with β = B θ the torque is that of the leading columns alone
-        moments.gram[..., chosen[:, None], chosen],
-        moments.count,
-        tuple(regressor.names[k] for k in base.independent),
-        moments.joints,
-    )
+    leading = moments.select_columns(base.independent)  # with β = B θ the torque is that of these alone
     weights = result.estimate.noise_std**-2.0
     fitted = base.transform @ result.estimate.parameters
     energy = np.diag(leading.pooled().xx) / max(float(leading.count[:, 0].sum()), 1.0)

@@ -31,8 +31,8 @@ class Cubic(FrictionColumn):
     def unit(self, direction):
         return "N m s^3/rad^3"
 
-    def torque(self, direction, position, velocity, acceleration):
-        return velocity**3
+    def torque(self, direction, state):
+        return state.velocity**3
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ class ForwardOnly(FrictionColumn):
     def unit(self, direction):
         return "N m"
 
-    def torque(self, direction, position, velocity, acceleration):
-        return ca.if_else(velocity > 0, ca.tanh(velocity / self.width), 0)
+    def torque(self, direction, state):
+        return ca.if_else(state.velocity > 0, ca.tanh(state.velocity / self.width), 0)
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,8 @@ class Spring(FrictionColumn):
     def unit(self, direction):
         return "N m/rad"
 
-    def torque(self, direction, position, velocity, acceleration):
-        return position if direction.name == self.joint else None
+    def torque(self, direction, state):
+        return state.position if direction.name == self.joint else None
 
 
 def columns(regressor, motion, first):

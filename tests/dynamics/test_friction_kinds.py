@@ -10,6 +10,7 @@ from casysid.dynamics import (
     DEFAULT_FRICTION,
     AsymmetricViscous,
     Coupling,
+    DriveState,
     LoadedCoulomb,
     PowerViscous,
     Spring,
@@ -57,8 +58,11 @@ def test_torques_are_those_of_the_formula(name):
 
 @given(st.floats(0.3, 3.0), st.floats(-2.0, 2.0))
 def test_powers_of_speed_are_odd_and_grow(exponent, speed):
-    column, direction = PowerViscous(1e-6, exponent), joint_directions(ARM)[0]
-    forward, backward = (float(column.torque(direction, 0.0, sign * speed, 0.0)) for sign in (1.0, -1.0))
+    column, direction = PowerViscous(1e-12, exponent), joint_directions(ARM)[0]
+    forward, backward = (
+        float(column.torque(direction, DriveState(0.0, sign * speed, 0.0, numbers=column.numbers(direction))))
+        for sign in (1.0, -1.0)
+    )
     assert forward == pytest.approx(-backward, abs=1e-15)
     assert forward * speed >= 0.0
     assert abs(forward) == pytest.approx(abs(speed) ** exponent, rel=1e-3, abs=1e-3)

@@ -15,12 +15,12 @@ def draw_moments(rng: np.random.Generator, joints: int = 2, blocks: int = 4, n: 
         rows = np.column_stack([x, t @ truth + 0.3 * (3.0 * j + 1.0) * rng.standard_normal(n)])
         gram[b, j] = rows.T @ rows
     columns, names = (tuple(f"{letter}{k}" for k in range(m)) for letter, m in (("x", p), ("joint_", joints)))
-    return Moments(gram, np.full((blocks, joints), float(n)), columns, names)
+    return Moments.from_dense(gram, np.full((blocks, joints), float(n)), columns, names)
 
 
 def transformed(moments: Moments, transform: np.ndarray, columns: tuple[str, ...]) -> Moments:
     """Moments of the rows ``r`` multiplied by ``transform``."""
-    return Moments(transform.T @ moments.gram @ transform, moments.count, columns, moments.joints)
+    return Moments.from_dense(transform.T @ moments.gram @ transform, moments.count, columns, moments.joints)
 
 
 def with_columns(moments: Moments, mixing: np.ndarray) -> Moments:

@@ -83,7 +83,9 @@ def test_the_scale_of_a_joints_rows_does_not_matter(estimator: Estimator, seed: 
     rng, slack = np.random.default_rng(seed), tolerance(estimator)
     moments = draw_moments(rng)
     scale = np.array([1.0, 10.0 ** rng.uniform(-2, 2)])
-    louder = Moments(moments.gram * scale[:, None, None] ** 2, moments.count, moments.columns, moments.joints)
+    louder = Moments.from_dense(
+        moments.gram * scale[:, None, None] ** 2, moments.count, moments.columns, moments.joints
+    )
     found, expected = estimator.estimate(louder), estimator.estimate(moments)
     np.testing.assert_allclose(found.parameters, expected.parameters, atol=slack)
     np.testing.assert_allclose(found.noise_std / scale, expected.noise_std, rtol=2 * slack)

@@ -22,7 +22,7 @@ def draw_problem(seed: int, *, noise: float = 0.1, joints: int = 2, rows: int = 
         y = x @ truth + noise * 10.0**joint * rng.normal(size=rows)
         problems.append((x, y))
         grams.append(Moments.from_rows(x, y, blocks=blocks))
-    moments = Moments(
+    moments = Moments.from_dense(
         np.concatenate([part.gram for part in grams], axis=1),
         np.concatenate([part.count for part in grams], axis=1),
         grams[0].columns,

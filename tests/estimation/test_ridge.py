@@ -1,5 +1,7 @@
 """Ridge in the geometry of the model file: shape, strength, and what data alone cannot say."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -57,7 +59,7 @@ def test_links_given_in_other_frames_give_the_same_torque(rng):
     turned = np.eye(len(COLUMNS) + 1)
     turned[:-1, :-1] = np.linalg.inv(move)
     gram = turned.T @ moments.gram @ turned
-    other = Moments(gram, moments.count, moments.columns, moments.joints)
+    other = Moments.from_dense(gram, moments.count, moments.columns, moments.joints)
     ridge = Ridge(strength=1e-2, standard_errors=False)
     here, there = ridge.estimate(moments, prior).parameters, ridge.estimate(other, move @ prior).parameters
     np.testing.assert_allclose(move @ here, there, atol=1e-5 * np.abs(there).max())
@@ -77,7 +79,7 @@ def test_the_models_geometry_finds_bodies_where_few_directions_are_shown():
     for seed in range(12):
         rng = np.random.default_rng(seed)
         moments, prior, truth, _ = draw(rng, noise=0.1)
-        plain = Moments(moments.gram, moments.count, tuple(f"x{k}" for k in range(len(COLUMNS))), moments.joints)
+        plain = dataclasses.replace(moments, columns=tuple(f"x{k}" for k in range(len(COLUMNS))))
         unseen = rng.normal(size=(200, len(COLUMNS))) @ np.diag(np.abs(prior) + 0.1)
         with_bodies, without = (Ridge().estimate(one, prior).parameters for one in (moments, plain))
         better.append(np.linalg.norm(unseen @ (with_bodies - truth)) < np.linalg.norm(unseen @ (without - truth)))

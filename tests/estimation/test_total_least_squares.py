@@ -95,7 +95,7 @@ def test_joints_may_have_noise_of_their_own() -> None:
     noise = np.stack([draw_noise(rng), 0.01 * draw_noise(rng)])
     rows = [np.column_stack(draw_rows(rng, each, n=20_000)) for each in noise]
     gram = np.stack([part.T @ part for part in rows])[None]
-    moments = Moments(gram, np.full((1, 2), 20_000.0), tuple("abcd"), ("first", "second"))
+    moments = Moments.from_dense(gram, np.full((1, 2), 20_000.0), tuple("abcd"), ("first", "second"))
     estimate = TotalLeastSquares(noise_covariance=noise).estimate(moments)
     np.testing.assert_allclose(estimate.parameters, TRUTH, atol=0.05)
 

@@ -140,7 +140,8 @@ def test_an_identification_counts_as_what_its_recordings_tell(problem, design, t
     recording, regressor = sample_recording(design, problem.rate), problem.information.regressor
     motion = motion_from_recording(problem.robot, recording, 20.0)
     moments = accumulate_moments(regressor, motion.q, motion.v, motion.a, motion.tau, blocks=3)
-    halved = dataclasses.replace(moments, gram=moments.gram / 2.0, count=moments.count / 2.0)  # pairs averaged
+    pairs = tuple(squares / 2.0 for squares in moments.squares)
+    halved = dataclasses.replace(moments, squares=pairs, count=moments.count / 2.0)  # as averages of pairs
     write_moments(halved, tmp_path / "moments.npz")
     (tmp_path / "result.json").write_text(json.dumps({"samples": {"train": len(recording)}}))
     wanted = after_recordings(problem, [recording], cutoff=20.0).known
@@ -169,10 +170,14 @@ def test_another_robots_identification_is_refused(problem, tmp_path):
         after_result(problem, tmp_path)
     regressor = problem.information.regressor
     sums = np.zeros((1, problem.robot.nv, len(regressor.names) + 1, len(regressor.names) + 1))
-    write_moments(Moments(sums, sums[:, :, 0, 0], regressor.names, ("left", "right")), tmp_path / "moments.npz")
+    write_moments(
+        Moments.from_dense(sums, sums[:, :, 0, 0], regressor.names, ("left", "right")), tmp_path / "moments.npz"
+    )
     with pytest.raises(ParameterError, match="other joints or columns"):
         after_result(problem, tmp_path)
-    write_moments(Moments(sums, sums[:, :, 0, 0], regressor.names, problem.robot.dofs), tmp_path / "moments.npz")
+    write_moments(
+        Moments.from_dense(sums, sums[:, :, 0, 0], regressor.names, problem.robot.dofs), tmp_path / "moments.npz"
+    )
     (tmp_path / "result.json").write_text("{}")
     with pytest.raises(ParameterError, match=r"no result\.json as casysid identify writes it"):
         after_result(problem, tmp_path)

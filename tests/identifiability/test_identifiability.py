@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from casysid.dynamics import Armature, Offset, Viscous, build_regressor
 from casysid.identifiability import (
+    RANK_TOLERANCE,
     BaseParameters,
     Identifiability,
     base_parameters_of_gram,
@@ -46,6 +47,41 @@ def test_the_rank_is_that_of_the_regressor(robot, rng):
     singular = np.linalg.svd(rows / np.where(length > 1e-9 * length.max(), length, np.inf), compute_uv=False)
     expected = int((singular > 1e-7 * singular[0]).sum())
     assert structural_base_parameters(build_regressor(robot, friction=SMOOTH)).rank == expected
+
+
+def slowly(rows: np.ndarray, tolerance: float) -> tuple[list[int], np.ndarray]:
+    """Gram and Schmidt on the rows' columns one by one, and least squares of all columns on those before them."""
+    unit = rows / np.linalg.norm(rows, axis=0)
+    basis, independent = np.empty((len(rows), 0)), []
+    for column in range(rows.shape[1]):
+        rest = unit[:, column] - basis @ (basis.T @ unit[:, column])
+        rest -= basis @ (basis.T @ rest)
+        if np.linalg.norm(rest) > tolerance * np.sqrt(rows.shape[1]):
+            independent.append(column)
+            basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
+    return independent, np.linalg.lstsq(rows[:, independent], rows, rcond=None)[0]
+
+
+@settings(max_examples=10, deadline=None)
+@given(generators(), st.integers(1, 90), st.integers(70, 150))
+def test_columns_are_eliminated_as_by_gram_and_schmidt(rng, rank, p):
+    rows = rng.normal(size=(200, min(rank, p))) @ rng.normal(size=(min(rank, p), p))
+    base = base_parameters_of_gram(rows.T @ rows, tuple(f"x{k}" for k in range(p)))
+    independent, transform = slowly(rows, RANK_TOLERANCE)
+    assert base.independent.tolist() == independent
+    np.testing.assert_allclose(base.transform, transform, atol=1e-4 * np.abs(transform).max())
+
+
+@LAWS
+@given(robots(max_joints=3))
+def test_structure_is_that_of_the_rows_at_random_states(robot):
+    regressor = build_regressor(robot, friction=SMOOTH)
+    rows = rows_of(robot, np.random.default_rng(0), 60)
+    slow = base_parameters_of_gram(rows.T @ rows, regressor.names, quietest=RANK_TOLERANCE)
+    base = structural_base_parameters(regressor, samples=60)
+    assert base.independent.tolist() == slow.independent.tolist()
+    np.testing.assert_allclose(base.transform, slow.transform, atol=1e-6 * np.abs(slow.transform).max())
+    assert base.condition_number == pytest.approx(slow.condition_number, rel=1e-6)
 
 
 @LAWS
@@ -97,7 +133,7 @@ def test_data_show_no_more_than_the_structure_has(robot, rng):
     rows = regressor.evaluate(*random_states(robot, 3, rng))
     tall = np.concatenate([rows, np.zeros((*rows.shape[:2], 1))], axis=2)
     gram = np.einsum("njm,njk->jmk", tall, tall)[None]
-    moments = Moments(gram, np.full((1, robot.nv), 3.0), regressor.names, robot.dofs)
+    moments = Moments.from_dense(gram, np.full((1, robot.nv), 3.0), regressor.names, robot.dofs)
     shown = excited_base_parameters(regressor, moments, np.ones(robot.nv))
     assert shown.rank <= min(structural_base_parameters(regressor).rank, 3 * robot.nv)
 

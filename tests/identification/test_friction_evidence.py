@@ -119,7 +119,7 @@ def test_held_out_energies_are_those_of_fits_one_by_one(columns):
     rows[1][0][:, KNOWN + 4] = 0.0  # acts on the first joint alone
     parts = [Moments.from_rows(x, y, blocks=BLOCKS) for x, y in rows]
     gram, count = (np.concatenate([getattr(part, name) for part in parts], axis=1) for name in ("gram", "count"))
-    moments = Moments(gram, count, parts[0].columns, ("one", "two"))
+    moments = Moments.from_dense(gram, count, parts[0].columns, ("one", "two"))
     weights, strength = rng.uniform(0.5, 2.0, 2), 1e-3
     stretches = np.array_split(np.arange(BLOCKS), 5)
     root = rng.normal(size=(KNOWN, KNOWN))

@@ -51,7 +51,7 @@ def test_noise_moments_of_an_acceleration_are_those_of_the_whole_linear_chain():
         energy += np.sum((BandAverage(recording.time, CUTOFF).weights(block) @ chain[block]) ** 2)
     for joint in range(robot.nv):
         column = regressor.names.index(f"{robot.dofs[joint]}.armature")
-        gained = problem.moments.noise[:, joint, column, column].sum()
+        gained = problem.moments.dense_noise[:, joint, column, column].sum()
         assert gained == pytest.approx(sigma**2 * energy, rel=0.4)
 
 
@@ -97,7 +97,7 @@ def test_noise_moments_of_unordered_samples_add_over_blocks(seed, sigma):
     robot, recording, *_ = unordered(levels, seed, duration=2.0)
     many, one = (problem_of(robot, recording, levels, blocks).moments for blocks in (8, 4))
     size = np.abs(one.gram).sum(axis=0).max(axis=(-2, -1), keepdims=True)
-    assert np.abs(many.noise.sum(axis=0) - one.noise.sum(axis=0)).max() <= 1e-12 * size.max()
+    assert np.abs(many.dense_noise.sum(axis=0) - one.dense_noise.sum(axis=0)).max() <= 1e-12 * size.max()
 
 
 @pytest.mark.parametrize("timed", [True, False])
@@ -108,7 +108,7 @@ def test_no_noise_adds_nothing(timed):
         recording = dataclasses.replace(recording, time=np.arange(len(recording)) / RATE)
     chosen = Settings(input_noise=levels, blocks=4)
     moments = build_problem(robot, [recording], CUTOFF if timed else None, chosen).moments
-    assert np.abs(moments.noise).max() <= 1e-12 * moments.gram.max()
+    assert np.abs(moments.dense_noise).max() <= 1e-12 * moments.gram.max()
 
 
 def test_small_noise_of_unordered_samples_adds_the_sum_of_jacobians():
@@ -119,14 +119,14 @@ def test_small_noise_of_unordered_samples_adds_the_sum_of_jacobians():
     std = np.repeat([levels.position, levels.velocity, levels.acceleration], nv)
     state = np.concatenate([recording.position, recording.velocity, recording.acceleration], axis=1)
     step = 1e-5
-    slow = np.zeros(problem.moments.noise.shape[1:])
+    slow = np.zeros(problem.moments.gram.shape[1:])
     for k in range(3 * nv):  # central differences along every channel
         ahead, behind = (
             regressor.evaluate(*np.split(state + sign * step * np.eye(3 * nv)[k], 3, axis=1)) for sign in (1.0, -1.0)
         )
         column = std[k] * (ahead - behind) / (2.0 * step)  # (N, nv, p)
         slow[:, :-1, :-1] += np.einsum("njm,njp->jmp", column, column)
-    found = problem.moments.noise.sum(axis=0)
+    found = problem.moments.dense_noise.sum(axis=0)
     for joint in range(nv):
         diagonal = np.diag(slow[joint])[:-1]
         moved = diagonal > 0.05 * diagonal.max()

@@ -32,7 +32,7 @@ def homeless(regressor):
 
 def test_ordinary_friction_stays_as_it_is():
     regressor, theta, moments, _ = problem(friction=())
-    found = nearest_plain_friction(regressor.parameters, theta, moments, [])
+    found = nearest_plain_friction(regressor, theta, moments, [])
     assert {kind: values.tolist() for kind, values in found.items()} == {"viscous": [0.3, 0.3], "coulomb": [0.3, 0.3]}
 
 
@@ -41,7 +41,7 @@ def test_what_stands_for_other_friction_is_nearer_to_the_torque_than_nothing(sha
     regressor, theta, moments, state = problem()
     places = {name: k for k, name in enumerate(regressor.names)}
     theta[places["shoulder.power_viscous"]] = share
-    found = nearest_plain_friction(regressor.parameters, theta, moments, homeless(regressor))
+    found = nearest_plain_friction(regressor, theta, moments, homeless(regressor))
     plain, left_out = theta.copy(), theta.copy()
     plain[places["shoulder.power_viscous"]] = left_out[places["shoulder.power_viscous"]] = 0.0
     for kind, values in found.items():
@@ -55,7 +55,7 @@ def test_what_stands_for_other_friction_is_nearer_to_the_torque_than_nothing(sha
 def test_friction_by_direction_alone_changes_neither():
     regressor, theta, moments, _ = problem()
     theta[regressor.names.index("shoulder.viscous_asymmetry")] = 0.1
-    found = nearest_plain_friction(regressor.parameters, theta, moments, homeless(regressor))
+    found = nearest_plain_friction(regressor, theta, moments, homeless(regressor))
     assert found["viscous"] == pytest.approx([0.3, 0.3], abs=5e-3)
     assert found["coulomb"] == pytest.approx([0.3, 0.3], abs=5e-3)
 
@@ -63,7 +63,7 @@ def test_friction_by_direction_alone_changes_neither():
 def test_coefficients_are_never_negative():
     regressor, theta, moments, _ = problem()
     theta[regressor.names.index("shoulder.power_viscous")] = -5.0
-    found = nearest_plain_friction(regressor.parameters, theta, moments, homeless(regressor))
+    found = nearest_plain_friction(regressor, theta, moments, homeless(regressor))
     assert all((values >= 0.0).all() for values in found.values())
 
 
@@ -71,5 +71,5 @@ def test_a_shared_motor_brakes_both_joints():
     regressor, theta, moments, _ = problem(friction=(), couplings=[COUPLING])
     theta[regressor.names.index("shoulder+elbow.viscous")] = 0.2
     theta[regressor.names.index("shoulder+elbow.coulomb")] = 0.0
-    found = nearest_plain_friction(regressor.parameters, theta, moments, homeless(regressor))
+    found = nearest_plain_friction(regressor, theta, moments, homeless(regressor))
     assert found["viscous"] == pytest.approx([0.5, 0.5], abs=0.05)

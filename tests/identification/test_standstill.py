@@ -71,4 +71,4 @@ def test_noise_is_told_from_the_same_equations(sticking):
     plant, run = sticking
     moments = build_problem(plant.robot, [run.recording], CUTOFF, Settings(threads=1), moving_only=True).moments
     torque = moments.gram[..., -1, -1].sum(axis=0)
-    assert (np.abs(moments.noise[..., -1, -1]).sum(axis=0) < 1e-9 * torque).all()  # none came or went
+    assert (np.abs(moments.dense_noise[..., -1, -1]).sum(axis=0) < 1e-9 * torque).all()  # none came or went

@@ -52,7 +52,7 @@ def test_the_gain_is_the_noise_of_a_standing_joints_velocity(robots):
 def test_noise_that_is_taken_out_is_the_encoders(robots, recorded):
     moments = recorded.paper.moments
     names = recorded.paper.regressor.names
-    share = moments.noise.sum(axis=(0, 1)).diagonal() / np.maximum(moments.gram.sum(axis=(0, 1)).diagonal(), 1e-300)
+    share = moments.pooled_noise().diagonal() / np.maximum(moments.gram.sum(axis=(0, 1)).diagonal(), 1e-300)
     armature = [share[k] for k, name in enumerate(names) if name.endswith(".armature")]
     viscous = [share[k] for k, name in enumerate(names) if name.endswith(".viscous")]
     assert min(armature) > 10.0 * max(viscous) > 0.0
