@@ -1,6 +1,8 @@
 """The house stands: imports go one way, heavy packages stay in their rooms, files keep to one purpose."""
 
 import ast
+import importlib
+import inspect
 import subprocess
 import sys
 from pathlib import Path
@@ -81,6 +83,25 @@ def test_every_public_name_exists_and_is_documented():
     assert casysid.__all__ == sorted(casysid.__all__)
     for name in casysid.__all__:
         assert getattr(casysid, name).__doc__, name
+
+
+def public_functions():
+    """By name: of the package and of every room; rooms' inner modules pass paths among themselves."""
+    modules = [importlib.import_module("casysid"), *(importlib.import_module(f"casysid.{room}") for room in LEVEL)]
+    found = {}
+    for module in modules:
+        names = getattr(module, "__all__", [name for name in vars(module) if not name.startswith("_")])
+        found.update({name: getattr(module, name) for name in names})
+    return {
+        name: f for name, f in sorted(found.items()) if inspect.isfunction(f) and f.__module__.startswith("casysid")
+    }
+
+
+@pytest.mark.parametrize("name", public_functions())
+def test_paths_may_be_strings(name):
+    for argument, parameter in inspect.signature(public_functions()[name]).parameters.items():
+        kind = str(parameter.annotation)
+        assert "Path" not in kind or "str" in kind, f"{argument}: {kind}"
 
 
 def test_importing_the_command_line_loads_nothing_heavy():

@@ -53,6 +53,7 @@ def _load(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]]:
     return recording, (*unwrapped_sentences(statistics, robot), *find_weaknesses(statistics, robot))
 
 
+@single_threaded()
 def scan_recording(path: Path, robot: Robot) -> tuple[RecordingFile, tuple[str, ...]]:
     """The recording in a file, where it stays, and sentences about what is weak in it; reads the file once.
 
