@@ -42,6 +42,7 @@ from casysid.projection import ProjectionResult, build_projection, project
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.signals import Motion, aligned
+from casysid.signals.admission import FEWEST, FEWEST_TO_PREDICT, check_noise, check_recordings
 from casysid.uncertainty import ParameterUncertainty, propagate
 
 PRIOR_BUDGET = 0.03
@@ -124,6 +125,11 @@ def prepare(
     fitted = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     if not fitted:
         raise RecordingError("identify: at least one recording to fit is needed; got none")
+    for several, fewest in ((fitted, FEWEST), (held_out, FEWEST_TO_PREDICT)):
+        check_recordings(
+            several, cutoff=settings.cutoff, time_scale=settings.time_scale, delay=settings.delay, fewest=fewest
+        )
+    check_noise(fitted, settings.input_noise)
     clock = _Clock()
     fitted, held_out = (tuple(one.flipped(settings.flip) for one in several) for several in (fitted, held_out))
     time_base = settle_time_base(robot, fitted, settings)

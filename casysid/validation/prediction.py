@@ -16,6 +16,7 @@ from casysid.identification.problem import USUAL_WIDTH, make_motion, with_widths
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.signals import aligned
+from casysid.signals.admission import check_recordings
 from casysid.validation.earlier import Drives, EarlierResult
 
 
@@ -92,6 +93,7 @@ def validate(
         quasi_static=earlier.quasi_static,
         torque_gains=tuple(earlier.torque_gains.get(dof, 1.0) for dof in robot.dofs),
     )
+    check_recordings(recordings, cutoff=settings.cutoff, time_scale=earlier.time_scale)
     late = np.array([earlier.delays.get(dof, 0.0) for dof in robot.dofs])
     read = (recording.flipped(earlier.flip).with_time_scaled(earlier.time_scale) for recording in recordings)
     recordings = [aligned(recording, late) for recording in read]
