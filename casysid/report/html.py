@@ -36,7 +36,7 @@ class Section:
 def write_report(result: IdentificationResult, path: Path) -> None:
     """Write ``report.html``, whole or not at all."""
     temporary = path.with_name(path.name + ".part")
-    temporary.write_text(render_report(result), encoding="utf-8")
+    temporary.write_text(render_report(result), encoding="utf-8", errors="backslashreplace")
     os.replace(temporary, path)
 
 
