@@ -9,7 +9,6 @@ recordings, processes, machines.
 from __future__ import annotations
 
 import os
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +16,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from casysid.archives import read_arrays
 from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError
+
+ROUNDING = 1e-9
+"""By which sums of products may miss their laws, as a share of the largest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,13 +181,34 @@ def read_moments(path: Path) -> Moments:
         ParameterError: The file is not there, or is something else.
     """
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
-            columns, joints = (tuple(str(name) for name in content[key]) for key in ("columns", "joints"))
-            return Moments(content["gram"], content["count"], columns, joints)
-    except FileNotFoundError as error:
-        raise ParameterError(f"{path}: there is no such file; casysid identify writes it beside result.json") from error
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        if not path.is_file():
+            raise ParameterError(f"{path}: there is no such file; casysid identify writes it beside result.json")
+        content = read_arrays(path, ("gram", "count", "columns", "joints"))
+        columns, joints = (tuple(str(name) for name in content[key].ravel()) for key in ("columns", "joints"))
+        for key in ("gram", "count"):
+            if content[key].dtype.kind not in "buif":
+                raise ParameterError(f"'{key}' holds {content[key].dtype}, wanted real numbers")
+        moments = Moments(content["gram"], content["count"], columns, joints)
+        _check_sums(moments)
+    except (OSError, ValueError, TypeError) as error:
         raise ParameterError(f"{path}: these are no moments as casysid identify writes them ({error})") from error
+    return moments
+
+
+def _check_sums(moments: Moments) -> None:
+    """Nothing, if these can be sums of squares and products.
+
+    Raises:
+        ParameterError: They cannot.
+    """
+    if len(set(moments.columns)) < len(moments.columns) or (moments.count < 0.0).any() or not moments.blocks:
+        raise ParameterError("moments: a column is there twice, a count is negative, or there is no block")
+    diagonal = np.einsum("bjmm->bjm", moments.gram)
+    bound = np.sqrt(np.maximum(diagonal[..., :, None] * diagonal[..., None, :], 0.0))
+    slack = ROUNDING * np.abs(diagonal).max(initial=0.0)
+    uneven = np.abs(moments.gram - np.swapaxes(moments.gram, -1, -2)).max(initial=0.0)
+    if not (diagonal >= 0.0).all() or not (np.abs(moments.gram) <= bound + slack).all() or not uneven <= slack:
+        raise ParameterError("moments: gram is no sum of squares and products of real numbers")
 
 
 def _shift(gram: Array, parameters: Array) -> Array:
