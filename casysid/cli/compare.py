@@ -58,7 +58,7 @@ def compare(
     with speaking() as console:
         from rich.console import Console
 
-        from casysid.cli.console import rich_table
+        from casysid.cli.console import rich_table, say
         from casysid.estimation import ESTIMATORS, estimator_by_name
         from casysid.identification import compare as run
         from casysid.identification import prepare
@@ -77,9 +77,9 @@ def compare(
             comparison = run(preparation, estimators, settings, progress=progress)
         table = comparison_table(comparison)
         Console().print(rich_table("Torque error, best first", table.header, table.rows))
-        console.print(f"torque delay: {preparation.choices.delay.reason}", markup=False, soft_wrap=True)
+        say(console, f"torque delay: {preparation.choices.delay.reason}")
         for name, reason in comparison.failures.items():
-            console.print(f"{name} failed: {reason}", markup=False, soft_wrap=True)
+            say(console, f"{name} failed: {reason}")
         if out is not None:
             write_json(comparison.to_json(), out)
             typer.echo(str(out))

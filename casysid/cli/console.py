@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table as RichTable
+from rich.text import Text
 
 from casysid.errors import CasysidError
 
@@ -30,7 +31,7 @@ def speaking() -> Iterator[Console]:
             finally:
                 _tell_warnings(console, caught)
     except CasysidError as error:
-        console.print(f"[bold red]error:[/] {_plain(str(error))}", soft_wrap=True)
+        console.print(Text.assemble(("error:", "bold red"), f" {printable(str(error))}"), soft_wrap=True)
         sys.exit(BAD_INPUT)
     except KeyboardInterrupt:
         console.print("interrupted; nothing further was written")
@@ -62,20 +63,33 @@ def progress_bar(console: Console) -> Iterator[Callable[[str, float], None]]:
 def rich_table(title: str, header: tuple[str, ...], rows: tuple[tuple[str, ...], ...]) -> RichTable:
     """A table for the terminal: first column to the left, numbers to the right."""
     table = RichTable(
-        title=title, title_justify="left", title_style="bold", header_style="dim", box=None, pad_edge=False
+        title=Text(printable(title)),
+        title_justify="left",
+        title_style="bold",
+        header_style="dim",
+        box=None,
+        pad_edge=False,
     )
     for k, name in enumerate(header):
-        table.add_column(_plain(name), justify="left" if k == 0 else "right")
+        table.add_column(Text(printable(name)), justify="left" if k == 0 else "right")
     for row in rows:
-        table.add_row(*(_plain(cell) for cell in row))
+        table.add_row(*(Text(printable(cell)) for cell in row))
     return table
+
+
+def say(console: Console, text: str, *, style: str = "") -> None:
+    """A line, whatever names are in it."""
+    console.print(Text(printable(text), style), soft_wrap=True)
 
 
 def _tell_warnings(console: Console, caught: list[warnings.WarningMessage]) -> None:
     for text in dict.fromkeys(str(one.message) for one in caught):
-        console.print(f"[yellow]warning:[/] {_plain(text)}", soft_wrap=True)
+        console.print(Text.assemble(("warning:", "yellow"), f" {printable(text)}"), soft_wrap=True)
 
 
-def _plain(text: str) -> str:
-    """Text in which rich sees no markup."""
-    return text.replace("[", r"\[")
+def printable(text: str) -> str:
+    """Text as a terminal may be sent it: names from files and of files cannot colour it, move about or break it."""
+    return "".join(
+        letter if letter.isprintable() or letter == "\n" else letter.encode("unicode_escape", "replace").decode()
+        for letter in text
+    )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from casysid.cli.options import GravityOption, LockOption, RobotArgument, load_robot
+from casysid.cli.ranges import check_options, check_samples, numbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -88,12 +89,15 @@ def excite(
     ] = Path("excitation"),
 ) -> None:
     """Design the motion of ROBOT that tells most about its parameters, within all limits."""
-    from casysid.cli.console import SOLVER_FAILED, progress_bar, speaking
+    from casysid.cli.console import SOLVER_FAILED, progress_bar, say, speaking
 
     with speaking() as console:
         from casysid.excitation import DesignStatus, build_excitation, describe, design_set, limits_of, write_excitation
         from casysid.report.excitation_pictures import write_excitation_pictures
 
+        check_options(period=period, harmonics=harmonics, periods=periods, count=count, rate=rate, starts=starts)
+        check_options(acceleration=acceleration, jerk=jerk, clearance=clearance, floor=floor, seed=seed)
+        check_options(velocity_share=velocity_share, torque_share=torque_share)
         model = load_robot(robot, gravity, lock, floating_base=False)
         limits = limits_of(
             model,
@@ -102,16 +106,18 @@ def excite(
             acceleration=float("inf") if acceleration is None else acceleration,
             jerk=float("inf") if jerk is None else jerk,
         )
+        series = _series(limits, rate, period, harmonics)
+        check_samples(periods * series.period, rate)
         problem = build_excitation(
             model,
-            series=_series(limits, rate, period, harmonics),
+            series=series,
             periods=periods,
             rate=rate,
             limits=limits,
             clearance=clearance,
             obstacles=_obstacles(floor, wall or [], box or []),
             keep_in=_keep_in(model, keep_in or []),
-            start=None if start is None else _numbers("--start", start, model.nv),
+            start=None if start is None else numbers("--start", start, model.nv),
         )
         problem = _informed(model, problem, criterion, log or [])
         with progress_bar(console) as progress:
@@ -123,10 +129,10 @@ def excite(
             undrawn = _preview(designs, _folders(out, len(designs)))
         for design, folder in zip(designs, _folders(out, len(designs)), strict=True):
             for line in describe(design):
-                console.print(f"  · {line}", markup=False, soft_wrap=True)
+                say(console, f"  · {line}")
             typer.echo(str(folder / "excitation.csv"))
         if undrawn:
-            console.print(f"  · {undrawn}", markup=False, soft_wrap=True)
+            say(console, f"  · {undrawn}")
     if any(design.status is not DesignStatus.CONVERGED for design in designs):
         sys.exit(SOLVER_FAILED)
 
@@ -149,10 +155,10 @@ def _obstacles(floor: float | None, walls: list[str], boxes: list[str]) -> list[
     if floor is not None:
         found.append(HalfSpace("floor", np.array([0.0, 0.0, 1.0]), floor))
     for k, text in enumerate(walls, 1):
-        *normal, offset = _numbers("--wall", text, 4)
+        *normal, offset = numbers("--wall", text, 4)
         found.append(HalfSpace(f"wall {k}", np.array(normal), offset))
     for k, text in enumerate(boxes, 1):
-        corners = np.array(_numbers("--box", text, 6)).reshape(2, 3)
+        corners = np.array(numbers("--box", text, 6)).reshape(2, 3)
         found.append(Box(f"box {k}", corners.min(axis=0), corners.max(axis=0)))
     return found
 
@@ -162,22 +168,10 @@ def _keep_in(robot: Robot, texts: list[str]) -> list[KeepInBlock]:
 
     found = []
     for text in texts:
-        link, _, numbers = text.rpartition("=")
-        corners = _numbers("--keep-in", numbers, 6)
+        link, _, words = text.rpartition("=")
+        corners = numbers("--keep-in", words, 6)
         found.append(keep_in(robot, link, corners[:3], corners[3:]))
     return found
-
-
-def _numbers(option: str, text: str, count: int) -> list[float]:
-    from casysid.errors import ParameterError
-
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) != count:
-        raise ParameterError(f"{option} wants {count} numbers with commas between them; got {text!r}")
-    return values
 
 
 def _informed(robot: Robot, problem: ExcitationProblem, choice: CriterionChoice, logs: list[Path]) -> ExcitationProblem:

@@ -91,7 +91,7 @@ def identify(
 
 
 def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> None:
-    from casysid.cli.console import rich_table
+    from casysid.cli.console import rich_table, say
     from casysid.identification.verdict import judge
     from casysid.report import drive_table, error_table, link_table, noise_table
 
@@ -102,12 +102,12 @@ def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...
     ):
         console.print(rich_table(title, table.header, table.rows))
         console.print()
-    console.print(f"torque delay: {result.delay.reason}", markup=False, soft_wrap=True)
+    say(console, f"torque delay: {result.delay.reason}")
     if noise := noise_table(result):
         console.print(rich_table("Noise of the measured motion", noise.header, noise.rows))
         console.print()
     verdict = judge(result)
-    console.print(f"[bold {'green' if verdict.accepted else 'red'}]{verdict.headline}[/]")
+    say(console, verdict.headline, style="bold green" if verdict.accepted else "bold red")
     friction = [one.sentence for one in result.friction.chosen]
     for line in (*verdict.reasons, *verdict.remarks, *friction, *notes):
-        console.print(f"  · {line}", markup=False, soft_wrap=True)
+        say(console, f"  · {line}")

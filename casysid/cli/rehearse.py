@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from casysid.cli.options import FloatingOption, GravityOption, LockOption, RobotArgument, load_robot
+from casysid.cli.ranges import check_options, check_samples
 
 
 class ExcitationChoice(enum.StrEnum):
@@ -37,7 +38,7 @@ def rehearse(
     ),
 ) -> None:
     """Rehearse the identification of ROBOT on a simulated machine that differs from its file."""
-    from casysid.cli.console import SOLVER_FAILED, progress_bar, rich_table, speaking
+    from casysid.cli.console import SOLVER_FAILED, progress_bar, rich_table, say, speaking
 
     with speaking() as console:
         from casysid.estimation import Status, estimator_by_name
@@ -48,6 +49,8 @@ def rehearse(
         from casysid.validation import Excitation, RehearsalSettings, write_rehearsal
         from casysid.validation import rehearse as run
 
+        check_options(of="rehearse", seed=seed, duration=duration, rate=rate)
+        check_samples(duration, rate)
         identification = Settings(method=estimator_by_name(method)) if method else Settings()
         settings = RehearsalSettings(
             duration=duration,
@@ -67,7 +70,7 @@ def rehearse(
             console.print(rich_table(title, table.header, table.rows))
             console.print()
         for line in (*notes, *(f"picture: {path}" for path in pictures)):
-            console.print(f"  · {line}", markup=False, soft_wrap=True)
+            say(console, f"  · {line}")
         typer.echo(str(out / "rehearsal.json"))
     if rehearsal.result.status is not Status.CONVERGED:
         sys.exit(SOLVER_FAILED)

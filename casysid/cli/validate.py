@@ -17,6 +17,7 @@ from casysid.cli.options import (
     RobotArgument,
     load_robot,
 )
+from casysid.cli.ranges import check_options
 
 
 def validate(
@@ -49,6 +50,7 @@ def validate(
         from casysid.validation import EarlierResult, read_earlier_result
         from casysid.validation import validate as run
 
+        check_options(cutoff=cutoff)
         model = load_robot(robot, gravity, lock, floating_base)
         recordings = read_recordings(logs, model)
         earlier = read_earlier_result(result) if result else EarlierResult()

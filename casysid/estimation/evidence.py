@@ -1,8 +1,8 @@
 """The evidence of a linear model with a size for every group of parameters and a variance for every joint's rows.
 
 Deviations ``δ = θ - θ0`` of a group are Gaussian with covariance ``λ_g K_g``: the shape ``K_g`` is known beforehand,
-the size ``λ_g`` maximises the evidence, as do the variances ``σ_j²`` with what the fit took away given back. The likelihood
-is raised to the power ``1/κ``, because residuals are coloured and averaging windows overlap: ``κ`` is the variance of
+the size ``λ_g`` maximises the evidence, as do the variances ``σ_j²`` with what the fit took away given back. The
+likelihood is raised to the power ``1/κ``, because residuals are coloured and averaging windows overlap: ``κ`` is the variance of
 the blocks' scores over that of white residuals.
 
 Where parameters have to be possible, the posterior's mode among the possible ones takes the place of its mean: a prior
@@ -150,7 +150,7 @@ class EvidenceProblem:
             mean = C @ normal.xy
             new = mean if feasible is None else feasible(mean, P, normal.residual_energy(mean))
             step = new - delta
-            moved, delta = float(np.sqrt(max(step @ normal.xx @ step, 0.0))), new
+            moved, delta = float(np.sqrt(max(float(step @ normal.xx @ step), 0.0))), new
             variance = self._variances(totals, delta, C)
             decided = np.array([self._decided(group, C, size) for group, size in zip(self.groups, sizes, strict=True)])
             wanted: Array = self._sizes(delta, C, decided, careful=iteration <= CAREFUL_ROUNDS)

@@ -34,6 +34,7 @@ from casysid.projection import ProjectionProblem, ProjectionResult, build_projec
 from casysid.recording import Source
 from casysid.robot import Robot
 from casysid.signals import InputNoise, Motion
+from casysid.signals.admission import FEWEST, FEWEST_TO_PREDICT, check_noise, check_recordings
 from casysid.threads import single_threaded
 from casysid.uncertainty import ParameterUncertainty, propagate
 
@@ -125,6 +126,11 @@ def prepare(
     fitted = (recordings,) if isinstance(recordings, Source) else tuple(recordings)
     if not fitted:
         raise RecordingError("identify: at least one recording to fit is needed; got none")
+    for several, fewest in ((fitted, FEWEST), (held_out, FEWEST_TO_PREDICT)):
+        check_recordings(
+            several, cutoff=settings.cutoff, time_scale=settings.time_scale, delay=settings.delay, fewest=fewest
+        )
+    check_noise(fitted, settings.input_noise)
     clock = _Clock()
     fitted, held_out = (tuple(one.flipped(settings.flip) for one in several) for several in (fitted, held_out))
     progress("tuning", 0.0)

@@ -11,6 +11,7 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.excitation import ExcitationDesign, information_groups
 from casysid.excitation.output import expected_torque
+from casysid.report.labels import as_label
 from casysid.report.pictures import MEASURED, PREDICTED, RESIDUAL, figure
 from casysid.threads import single_threaded
 
@@ -51,7 +52,7 @@ def joint_figure(design: ExcitationDesign) -> Any:
         )
         ax.plot(time, motion.velocity[:, k] / limits.velocity[k], color=MEASURED, linewidth=0.9, label="velocity")
         _limits(ax, 1.0)
-        ax.set_ylabel(dof, fontsize=8)
+        ax.set_ylabel(as_label(dof), fontsize=8)
     axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=2, frameon=False, fontsize=8)
     axes[-1].set_xlabel("time [s], one period; shares of the limits")
     return canvas
@@ -67,7 +68,7 @@ def torque_figure(design: ExcitationDesign) -> Any:
         limit = problem.limits.torque[k]
         if np.isfinite(limit) and np.abs(torque[:, k]).max() > 0.4 * limit:
             _limits(ax, limit)
-        ax.set_ylabel(dof, fontsize=8)
+        ax.set_ylabel(as_label(dof), fontsize=8)
     axes[-1].set_xlabel("time [s], one period; torque [N m, N], limits drawn where they are near")
     return canvas
 
@@ -82,7 +83,7 @@ def distance_figure(design: ExcitationDesign) -> Any:
     values = block.measure(motion)
     canvas, (ax,) = figure(9.5, 3.2)
     for k in np.argsort(values.min(axis=0))[:6]:
-        ax.plot(time, values[:, k], linewidth=0.9, label=block.labels[k])
+        ax.plot(time, values[:, k], linewidth=0.9, label=as_label(block.labels[k]))
     ax.axhline(float(block.lower[0]), color=RESIDUAL, linewidth=1.0)
     ax.set_ylabel("distance [m]")
     ax.set_xlabel("time [s], one period")
@@ -98,7 +99,9 @@ def spectrum_figure(design: ExcitationDesign) -> Any:
     width = 0.8 / len(problem.robot.dofs)
     for k, dof in enumerate(problem.robot.dofs):
         amplitude = np.hypot(sine[k], cosine[k])
-        ax.bar(np.arange(1, problem.series.harmonics + 1) + (k + 0.5) * width - 0.4, amplitude, width, label=dof)
+        ax.bar(
+            np.arange(1, problem.series.harmonics + 1) + (k + 0.5) * width - 0.4, amplitude, width, label=as_label(dof)
+        )
     ax.set_xticks(range(1, problem.series.harmonics + 1), [f"{f:.3g}" for f in problem.series.frequencies])
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel("amplitude [rad, m]")
@@ -118,7 +121,7 @@ def information_figure(design: ExcitationDesign) -> Any:
         ax.scatter(before, place, color=MEASURED, s=16, label="before")
         ax.legend(frameon=False, fontsize=8)
     ax.set_xscale("log")
-    ax.set_yticks(place, [f"{group.owner} {group.kind}" for group in groups], fontsize=6)
+    ax.set_yticks(place, [f"{as_label(group.owner)} {group.kind}" for group in groups], fontsize=6)
     ax.set_xlabel("expected standard deviation (1: the torque noise, for a parameter in usual motion)")
     return canvas
 

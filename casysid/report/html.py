@@ -39,7 +39,7 @@ def write_report(result: IdentificationResult, path: str | Path) -> None:
     """Write ``report.html``, whole or not at all."""
     path = Path(path)
     temporary = path.with_name(path.name + ".part")
-    temporary.write_text(render_report(result), encoding="utf-8")
+    temporary.write_text(render_report(result), encoding="utf-8", errors="backslashreplace")
     os.replace(temporary, path)
 
 

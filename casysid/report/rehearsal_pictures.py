@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from casysid.report.labels import as_label
 from casysid.report.pictures import MEASURED, MOST_POINTS, PREDICTED, RESIDUAL, figure
 from casysid.report.tables import torque_unit
 from casysid.threads import single_threaded
@@ -55,7 +56,7 @@ def rehearsed_torque_figure(rehearsal: Rehearsal) -> Any:
         ax.plot(time, measured[shown, k], color=MEASURED, linewidth=2.2, label="measured")
         ax.plot(time, file[shown, k], color=RESIDUAL, linewidth=0.8, label="predicted by the model file")
         ax.plot(time, predicted[shown, k], color=PREDICTED, linewidth=1.0, label="predicted by identified parameters")
-        ax.set_ylabel(f"{dof}\n{torque_unit(result.robot, k)}", fontsize=8)
+        ax.set_ylabel(f"{as_label(dof)}\n{torque_unit(result.robot, k)}", fontsize=8)
     _legend(axes[0])
     axes[-1].set_xlabel("time [s], motion never fitted")
     return canvas
@@ -75,7 +76,7 @@ def tracking_figure(rehearsal: Rehearsal) -> Any:
         for k, ax in enumerate(axes):
             ax.plot(run.reference.time[shown], error[:, k], color=COLOURS[name], linewidth=1.0, label=label)
     for ax, dof in zip(axes, dofs, strict=True):
-        ax.set_ylabel(f"{dof}\nmrad, mm", fontsize=8)
+        ax.set_ylabel(f"{as_label(dof)}\nmrad, mm", fontsize=8)
     _legend(axes[0])
     axes[-1].set_xlabel("time [s], position error under computed torque")
     return canvas
@@ -102,7 +103,7 @@ def parameter_figure(rehearsal: Rehearsal) -> Any:
         linewidth=1.2,
         label="identified, with 95 % interval",
     )
-    ax.set_yticks(places, [_short(base.names[k]) for k in order], fontsize=7)
+    ax.set_yticks(places, [as_label(_short(base.names[k])) for k in order], fontsize=7)
     ax.set_xscale("symlog", linthresh=max(float(np.median(np.abs(before))), 1e-9))
     ax.set_xlabel("distance from the true value, as the RMS torque that it makes [N m]")
     _legend(ax)
