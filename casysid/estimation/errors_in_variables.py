@@ -30,8 +30,11 @@ from casysid.estimation.standardise import (
     seen_directions,
     solve_least_squares,
 )
+from casysid.memory import NUMBER, require_memory
 from casysid.moments import Moments
 
+DENSE = 6
+"""Sums of all columns by all columns for each block and joint that live at once: two, their products, and copies."""
 REWEIGHTINGS = 3
 """Of the joints, before the energy of their residuals is settled."""
 
@@ -98,6 +101,10 @@ def limit_noise(moments: Moments, margin: float) -> LimitedNoise:
 
     ``M = W (Λ - margin)₊ Wᵀ G`` with the pooled sums G and ``Wᵀ G W = 1``, ``Wᵀ N W = Λ``; pooled, the noise is then
     no more than the margin in any direction, and untouched where it was not.
+
+    Raises:
+        ParameterError: Noise was too heavy in some direction, and the sums of so many joints, which then hold all
+            columns, would not fit into memory.
     """
     assert moments.noise is not None
     weights = estimate_noise_std(moments) ** -2.0
@@ -108,6 +115,12 @@ def limit_noise(moments: Moments, margin: float) -> LimitedNoise:
     heaviest = float(shares.max(initial=0.0))
     if not excess.any():
         return LimitedNoise(moments, heaviest, 0)
+    joints, p = len(moments.joints), len(moments.columns)
+    require_memory(
+        DENSE * NUMBER * moments.blocks * joints * (p + 1.0) ** 2,
+        f"errors in variables: taking out noise as heavy as this at {joints} joints with {p} columns",
+        "Take method ridge, lock joints that do not move, or take fewer blocks",
+    )
     W = whitened @ turned[:, excess]
     M = (W * (shares[excess] - margin)) @ W.T @ gram
     sums, limited = moments.gram, np.array(moments.dense_noise)
