@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple, Self
@@ -193,8 +194,9 @@ class Source(ABC):
         """Short recordings in memory from ``count`` places evenly over this one; all of it if it is no longer."""
         if len(self) <= count * rows:
             return tuple(self.batches(max(len(self), 1)))
-        starts = np.linspace(0, len(self) - rows, count).astype(int)
-        return tuple(next(iter(self.between(int(start), int(start) + rows).batches(rows))) for start in starts)
+        starts = np.linspace(0, len(self) - rows, count).astype(int).tolist()
+        parts = (next(self.between(start, start + rows).batches(rows)) for start in starts)
+        return tuple(dataclasses.replace(part) for part in parts)  # copies, where a part may be a view of a batch
 
 
 def signs_of(source: Source, columns: Sequence[str]) -> tuple[list[float], list[float], list[float]]:
