@@ -111,6 +111,11 @@ class Source(ABC):
         """
 
     @property
+    def segments(self) -> tuple[slice, ...]:
+        """Rows of the runs of samples between steps of time longer than five median steps; empty without time."""
+        return tuple(stretch.rows for stretch in self.stretches())
+
+    @property
     @abstractmethod
     def spectrum(self) -> PositionSpectrum:
         """Averaged periodogram of the positions.
