@@ -104,6 +104,11 @@ class LogFile:
     dofs: tuple[str, ...]
     wrapped: tuple[int, ...]
 
+    @property
+    def seekable(self) -> bool:
+        """Whether samples far into the file are found without reading all before them."""
+        return self.table.seekable and not self.wrapped
+
     def read(self, first: int = 0, *, time_only: bool = False) -> Iterator[Recording]:
         """All samples from row ``first`` on, in consecutive batches.
 

@@ -31,6 +31,11 @@ class ParquetTable:
     path: Path
     names: tuple[str, ...]
 
+    @property
+    def seekable(self) -> bool:
+        """See :class:`~casysid.readers.table.Table`."""
+        return True
+
     def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
         """The named columns batch by batch; see :class:`~casysid.readers.table.Table`."""
         import pyarrow as pa

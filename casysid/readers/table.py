@@ -25,6 +25,11 @@ class Table(Protocol):
         """Column names in the file's order."""
         ...
 
+    @property
+    def seekable(self) -> bool:
+        """Whether rows far into the file are found without reading all before them."""
+        ...
+
     def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
         """The columns as float64 from row ``first`` (counted from 0) on, some ten thousand rows at a time.
 

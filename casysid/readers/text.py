@@ -47,6 +47,11 @@ class TextTable:
     delimiter: str
     decimal: str
 
+    @property
+    def seekable(self) -> bool:
+        """See :class:`~casysid.readers.table.Table`."""
+        return False
+
     def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
         """The named columns batch by batch; see :class:`~casysid.readers.table.Table`."""
         from pyarrow import csv as pa_csv

@@ -43,7 +43,7 @@ def _gaps(log: Statistics, robot: Robot) -> Iterator[str]:
         yield (
             f"{len(gaps)} gaps in time, the largest {lengths[largest]:.4g} s "
             f"after {gaps[largest, 0]:.6g} s (the usual step is {log.steps.median:.4g} s); "
-            "the stretches between them are smoothed one by one"
+            "what one parts that is long beside the low-pass is smoothed piece by piece"
         )
 
 

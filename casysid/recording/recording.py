@@ -144,14 +144,6 @@ class Recording(Source):
         count, length = len(self._steps) - len(gaps), self.duration - float(gaps.sum())
         return count / length if count and length > 0.0 else float("nan")
 
-    @cached_property
-    def segments(self) -> tuple[slice, ...]:
-        """Runs of samples between the gaps in time; empty without time.
-
-        A gap is a step longer than five median steps.
-        """
-        return tuple(stretch.rows for stretch in self.stretches())
-
     def stretches(self, gap: float | None = None) -> tuple[Stretch, ...]:
         """The runs of samples between gaps in time; see :meth:`Source.stretches`."""
         if self.time is None:
