@@ -12,6 +12,7 @@ from casysid.cli.ranges import check_options, checked, numbers
 
 if TYPE_CHECKING:
     from casysid.identification import Settings
+    from casysid.recording import Source
     from casysid.robot import Robot
     from casysid.signals import NoiseLevels
 
@@ -113,7 +114,7 @@ def load_recordings(
 ) -> tuple[list[Source], list[Source]]:
     """The fitted and the held-out recordings."""
     from casysid.identification.passes import is_long
-    from casysid.recording import open_recordings
+    from casysid.recording import Source, open_recordings
 
     check_options(split=split)
     fitted, unseen = list[Source](), list[Source]()

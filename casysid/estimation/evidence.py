@@ -2,8 +2,8 @@
 
 Deviations ``δ = θ - θ0`` of a group are Gaussian with covariance ``λ_g K_g``: the shape ``K_g`` is known beforehand,
 the size ``λ_g`` maximises the evidence, as do the variances ``σ_j²`` with what the fit took away given back. The
-likelihood is raised to the power ``1/κ``, because residuals are coloured and averaging windows overlap: ``κ`` is the variance of
-the blocks' scores over that of white residuals.
+likelihood is raised to the power ``1/κ``, because residuals are coloured and averaging windows overlap: ``κ`` is the
+variance of the blocks' scores over that of white residuals.
 
 Where parameters have to be possible, the posterior's mode among the possible ones takes the place of its mean: a prior
 that lets masses be negative would explain with them what is an offset of the sensor.

@@ -1,8 +1,8 @@
 """The one place where recordings are smoothed and their equations summed; both are counted.
 
-Short recordings are smoothed once and kept. Long ones are smoothed anew in every pass, piece by piece, each with so many
-samples beside it that the smoothing has forgotten where it ends; only sums are kept, so memory does not grow with the
-length. What is chosen from the data is then chosen by excerpts.
+Short recordings are smoothed once and kept. Long ones are smoothed anew in every pass, piece by piece, each with so
+many samples beside it that the smoothing has forgotten where it ends; only sums are kept, so memory does not grow with
+the length. What is chosen from the data is then chosen by excerpts.
 """
 
 from __future__ import annotations

@@ -249,7 +249,7 @@ def _project(
 
 @dataclass(frozen=True, eq=False)
 class _Chosen:
-    """Choices, with the regressor and the moments that they led to, passes over all, and over what choices looked at."""
+    """Choices, the regressor and the moments that they led to, and passes over all and over what was looked at."""
 
     choices: Choices
     regressor: Regressor
