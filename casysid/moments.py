@@ -8,7 +8,6 @@ recordings, processes, machines.
 
 from __future__ import annotations
 
-import os
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ import numpy.typing as npt
 
 from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError
+from casysid.outputs import whole_file
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,20 +155,19 @@ class Moments:
 
 
 def write_moments(moments: Moments, path: Path) -> None:
-    """Write the sums over all blocks as NPZ: ``gram``, ``count``, ``columns``, ``joints``; noise is left out."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with partial.open("wb") as stream:
-            np.savez_compressed(
-                stream,
-                gram=moments.gram.sum(axis=0, keepdims=True),
-                count=moments.count.sum(axis=0, keepdims=True),
-                columns=np.array(moments.columns),
-                joints=np.array(moments.joints),
-            )
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    """Write the sums over all blocks as NPZ: ``gram``, ``count``, ``columns``, ``joints``; noise is left out.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
+    with whole_file(path) as stream:
+        np.savez_compressed(
+            stream,
+            gram=moments.gram.sum(axis=0, keepdims=True),
+            count=moments.count.sum(axis=0, keepdims=True),
+            columns=np.array(moments.columns),
+            joints=np.array(moments.joints),
+        )
 
 
 def read_moments(path: Path) -> Moments:

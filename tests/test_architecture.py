@@ -10,6 +10,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "casysid"
 ORDER = (
     ("errors", "arrays"),
+    ("outputs",),
     ("nlp", "inertia"),
     ("robot", "bundled"),
     ("recording", "readers", "dynamics"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -10,16 +9,25 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.excitation import ExcitationDesign, information_groups
-from casysid.excitation.output import expected_torque
-from casysid.report.pictures import MEASURED, PREDICTED, RESIDUAL, figure
+from casysid.excitation.output import expected_torque, identity_of
+from casysid.outputs import Stage, run_folder
+from casysid.report.pictures import MEASURED, PREDICTED, RESIDUAL, figure, write_png
 
 _POINTS = 1200
 
 
 def write_excitation_pictures(design: ExcitationDesign, directory: str | Path) -> tuple[Path, ...]:
-    """Write pictures of joints, torque, distances (if any are kept), spectrum and information as PNG files."""
-    folder = Path(directory)
-    folder.mkdir(parents=True, exist_ok=True)
+    """Write pictures of joints, torque, distances (if any are kept), spectrum and information as PNG files.
+
+    Raises:
+        OutputError: They cannot be written, or the directory has pictures of another motion.
+    """
+    with run_folder(directory, identity_of(design), joining=True) as stage:
+        return add_excitation_pictures(design, stage)
+
+
+def add_excitation_pictures(design: ExcitationDesign, stage: Stage) -> tuple[Path, ...]:
+    """Write the pictures to where a run's files wait; the paths that they will have."""
     pictures = {
         "joints.png": joint_figure(design),
         "torque.png": torque_figure(design),
@@ -30,10 +38,8 @@ def write_excitation_pictures(design: ExcitationDesign, directory: str | Path) -
     written = []
     for name, canvas in pictures.items():
         if canvas is not None:
-            partial = folder / f".{name}.{os.getpid()}.part"
-            canvas.savefig(partial, format="png", dpi=110)
-            os.replace(partial, folder / name)
-            written.append(folder / name)
+            write_png(canvas, stage.folder / name, dpi=110)
+            written.append(stage.home / name)
     return tuple(written)
 
 
