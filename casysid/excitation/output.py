@@ -14,7 +14,7 @@ from casysid.arrays import Array
 from casysid.errors import ParameterError, SolverError
 from casysid.excitation.results import ExcitationDesign
 from casysid.excitation.words import describe
-from casysid.outputs import Stage, run_folder, write_whole
+from casysid.outputs import MANIFEST, Stage, run_folder, write_whole
 from casysid.recording import Recording
 
 MESSAGE_RATE = 100.0
@@ -35,7 +35,7 @@ def write_excitation(design: ExcitationDesign, directory: str | Path, *, rate: f
         rate: Samples per second [Hz]; None takes the problem's.
 
     Returns:
-        The files.
+        The files, the last one of which lists them.
 
     Raises:
         SolverError: The motion violates a limit; nothing is written. The message names who, when and by how much.
@@ -43,7 +43,8 @@ def write_excitation(design: ExcitationDesign, directory: str | Path, *, rate: f
         OutputError: They cannot be written; the directory is as it was.
     """
     with run_folder(directory, identity_of(design)) as stage:
-        return add_excitation(design, stage, rate=rate)
+        files = add_excitation(design, stage, rate=rate)
+    return *files, stage.home / MANIFEST
 
 
 def add_excitation(design: ExcitationDesign, stage: Stage, *, rate: float | None = None) -> tuple[Path, ...]:

@@ -12,6 +12,7 @@ from casysid.errors import OutputError
 from casysid.outputs.files import write_whole
 
 MANIFEST = ".casysid.json"
+"""Where it is written down, in the same folder."""
 
 
 @dataclass(frozen=True)

@@ -207,9 +207,6 @@ def _change(stage: Path, identity: str, claims: Sequence[str], joining: bool) ->
         switch(stage, sorted(gone))
     finally:
         settle(stage)
-    for folder in {(home / name).parent for name in gone} - {home}:
-        with suppress(OSError):  # it holds something else
-            folder.rmdir()
 
 
 @contextmanager

@@ -56,6 +56,8 @@ def switch(stage: Path, gone: Sequence[str]) -> None:
 def settle(stage: Path) -> None:
     """Make ordinary files of the names that go through a stage, in whatever state it was left, and remove it.
 
+    Folders in which nothing is left go too.
+
     Raises:
         OSError: It cannot be done; the names still go through the stage, and it can be tried again.
     """
@@ -64,6 +66,9 @@ def settle(stage: Path) -> None:
         if _leads_through(home / name, stage, name):
             _make_ordinary(stage, name)
     _sync(home, names)
+    for folder in {(home / name).parent for name in names if not (home / name).exists()} - {home}:
+        with suppress(OSError):  # it was never made, or holds something else
+            folder.rmdir()
     shutil.rmtree(stage)
 
 
