@@ -78,6 +78,10 @@ def check_output_file(path: Path) -> None:
     """
     with blaming(path):
         require_replaceable(path)
+        if path.is_symlink() and not path.exists():
+            raise OutputError(
+                f"{path}: cannot be written: this symbolic link leads nowhere. Remove it, or name another"
+            )
         if not path.parent.is_dir():
             kind = "is a file, not a folder" if path.parent.exists() else "does not exist; make it first"
             raise OutputError(f"{path}: cannot be written: the folder {path.parent} {kind}")
