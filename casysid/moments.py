@@ -12,7 +12,6 @@ the squares of its own columns and no others.
 from __future__ import annotations
 
 import dataclasses
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,6 +24,7 @@ import numpy.typing as npt
 from casysid.archives import array_headers, read_arrays
 from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError
+from casysid.outputs import whole_file
 
 Indices = npt.NDArray[np.intp]
 NEAR_REST = " near rest"
@@ -344,28 +344,26 @@ class Moments:
         return self._mapped(widened, row_columns=rows)
 
 
-def write_moments(moments: Moments, path: Path) -> None:
+def write_moments(moments: Moments, path: str | Path) -> None:
     """Write the sums over all blocks as NPZ; noise is left out.
 
     ``squares`` and ``row_columns`` are those of all joints one after the other, ``widths`` the number of each one's
     columns; ``count``, ``columns`` and ``joints`` are as in :class:`Moments`.
+
+    Raises:
+        OutputError: The file cannot be written.
     """
     whole = moments.merged_blocks([np.arange(moments.blocks)])
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with partial.open("wb") as stream:
-            np.savez_compressed(
-                stream,
-                squares=np.concatenate([sums.ravel() for sums in whole.squares]),
-                row_columns=np.concatenate(whole.row_columns),
-                widths=np.array([len(own) for own in whole.row_columns]),
-                count=whole.count,
-                columns=np.array(moments.columns),
-                joints=np.array(moments.joints),
-            )
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with whole_file(Path(path)) as stream:
+        np.savez_compressed(
+            stream,
+            squares=np.concatenate([sums.ravel() for sums in whole.squares]),
+            row_columns=np.concatenate(whole.row_columns),
+            widths=np.array([len(own) for own in whole.row_columns]),
+            count=whole.count,
+            columns=np.array(moments.columns),
+            joints=np.array(moments.joints),
+        )
 
 
 def read_moments(path: str | Path) -> Moments:

@@ -12,6 +12,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "casysid"
 ORDER = (
     ("errors", "arrays", "archives", "memory", "threads"),
+    ("outputs",),
     ("nlp", "inertia"),
     ("robot", "bundled"),
     ("recording", "readers", "dynamics"),

@@ -53,7 +53,7 @@ def compare(
     out: Annotated[Path | None, typer.Option(help="Write the figures to this JSON file.")] = None,
 ) -> None:
     """Compare every estimator on the same recordings of ROBOT."""
-    from casysid.cli.console import progress_bar, speaking
+    from casysid.cli.console import progress_bar, speaking, tell_path
 
     with speaking() as console:
         from rich.console import Console
@@ -63,7 +63,10 @@ def compare(
         from casysid.identification import compare as run
         from casysid.identification import prepare
         from casysid.identification.output import write_json
+        from casysid.outputs import check_output_file
 
+        if out is not None:
+            check_output_file(out)
         names = [kind.name for kind in ESTIMATORS] if methods == "all" else methods.split(",")
         estimators = [estimator_by_name(name) for name in names]
         settings = make_settings(
@@ -82,7 +85,8 @@ def compare(
             say(console, f"{name} failed: {reason}")
         if out is not None:
             write_json(comparison.to_json(), out)
-            typer.echo(str(out))
+            console.wrote(out)
+            tell_path(out)
 
 
 def comparison_table(comparison: Comparison) -> Table:

@@ -2,27 +2,63 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from casysid.cli.bug_report import INTERNAL_FAULT, describe_fault
 from casysid.errors import CasysidError
+from casysid.outputs import Stage, run_folder
 
 BAD_INPUT = 2
 SOLVER_FAILED = 1
 INTERRUPTED = 130
 
 
+class Voice(Console):
+    """A console on stderr that remembers what has been written, for whoever interrupts."""
+
+    def __init__(self) -> None:
+        super().__init__(stderr=True)
+        self._written: list[Path] = []
+
+    @contextmanager
+    def run_folder(self, directory: Path, identity: str = "", **options: Any) -> Iterator[Stage]:
+        """As :func:`casysid.outputs.run_folder`; says when it has to wait."""
+
+        def wait(sentence: str) -> None:
+            say(self, sentence)
+
+        with run_folder(directory, identity, waiting=wait, written=self.wrote, **options) as stage:
+            yield stage
+
+    def wrote(self, place: Path) -> None:
+        """Files have been written there."""
+        self._written.append(place)
+
+    @property
+    def interruption(self) -> str:
+        """What is to be said when the run is interrupted."""
+        done = f"the files in {self._written[-1]} are complete" if self._written else "nothing was written"
+        return f"interrupted; {done}"
+
+
 @contextmanager
-def speaking() -> Iterator[Console]:
-    """A console on stderr; casysid's errors become one message and exit code 2, warnings one line each."""
-    console = Console(stderr=True)
+def speaking() -> Iterator[Voice]:
+    """A console on stderr; casysid's errors become one message and exit code 2, warnings one line each.
+
+    Ctrl-C ends with exit code 130. What is nobody's bad input is a fault of casysid: exit code 70.
+    """
+    console = Voice()
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
@@ -34,8 +70,21 @@ def speaking() -> Iterator[Console]:
         console.print(Text.assemble(("error:", "bold red"), f" {printable(str(error))}"), soft_wrap=True)
         sys.exit(BAD_INPUT)
     except KeyboardInterrupt:
-        console.print("interrupted; nothing further was written")
+        say(console, console.interruption)
         sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        raise
+    except Exception as error:
+        message = printable(describe_fault(error))
+        console.print(Text.assemble(("internal error:", "bold red"), f" {message}"), soft_wrap=True)
+        sys.exit(INTERNAL_FAULT)
+
+
+def tell_path(path: Path) -> None:
+    """The path alone on stdout, in the bytes that it has on the disk."""
+    import typer
+
+    typer.echo(os.fsencode(path))
 
 
 @contextmanager

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         KeepInBlock,
     )
     from casysid.excitation.results import Progress
+    from casysid.outputs import Stage
     from casysid.robot import Robot
 
 
@@ -89,15 +90,18 @@ def excite(
     ] = Path("excitation"),
 ) -> None:
     """Design the motion of ROBOT that tells most about its parameters, within all limits."""
-    from casysid.cli.console import SOLVER_FAILED, progress_bar, say, speaking
+    from casysid.cli.console import SOLVER_FAILED, progress_bar, say, speaking, tell_path
 
     with speaking() as console:
-        from casysid.excitation import DesignStatus, build_excitation, describe, design_set, limits_of, write_excitation
-        from casysid.report.excitation_pictures import write_excitation_pictures
+        from casysid.excitation import DesignStatus, build_excitation, describe, design_set, limits_of
+        from casysid.excitation.output import add_excitation, identity_of
+        from casysid.outputs import check_run_folder
+        from casysid.report.excitation_pictures import add_excitation_pictures
 
         check_options(period=period, harmonics=harmonics, periods=periods, count=count, rate=rate, starts=starts)
         check_options(acceleration=acceleration, jerk=jerk, clearance=clearance, floor=floor, seed=seed)
         check_options(velocity_share=velocity_share, torque_share=torque_share)
+        check_run_folder(out, ["excitation.csv", "excitation.json", "joint_trajectory.yaml", "excitation.txt"])
         model = load_robot(robot, gravity, lock, floating_base=False)
         limits = limits_of(
             model,
@@ -122,15 +126,19 @@ def excite(
         problem = _informed(model, problem, criterion, log or [])
         with progress_bar(console) as progress:
             designs = design_set(problem, count, starts=starts, seed=seed, progress=_watch(progress))
-            for design, folder in zip(designs, _folders(out, len(designs)), strict=True):
-                progress("write", 0.0)
-                write_excitation(design, folder)
-                write_excitation_pictures(design, folder)
-            undrawn = _preview(designs, _folders(out, len(designs)))
-        for design, folder in zip(designs, _folders(out, len(designs)), strict=True):
+            if any(design.status is DesignStatus.INTERRUPTED for design in designs):
+                raise KeyboardInterrupt
+            progress("write", 0.0)
+            with console.run_folder(out, identity_of(designs[0])) as stage:
+                stages = _stages(stage, len(designs))
+                for design, own in zip(designs, stages, strict=True):
+                    add_excitation(design, own)
+                    add_excitation_pictures(design, own)
+                undrawn = _preview(designs, stages)
+        for design, own in zip(designs, stages, strict=True):
             for line in describe(design):
                 say(console, f"  · {line}")
-            typer.echo(str(folder / "excitation.csv"))
+            tell_path(own.home / "excitation.csv")
         if undrawn:
             say(console, f"  · {undrawn}")
     if any(design.status is not DesignStatus.CONVERGED for design in designs):
@@ -192,14 +200,14 @@ def _informed(robot: Robot, problem: ExcitationProblem, choice: CriterionChoice,
     return after_recordings(problem, read_recordings(recordings, robot)) if recordings else problem
 
 
-def _preview(designs: tuple[ExcitationDesign, ...], folders: list[Path]) -> str:
+def _preview(designs: tuple[ExcitationDesign, ...], stages: list[Stage]) -> str:
     """Draw the robot on its motions; what is in the way of that, if anything."""
     from casysid.errors import MissingExtraError
-    from casysid.report.excitation_preview import write_excitation_preview
+    from casysid.report.excitation_preview import add_excitation_preview
 
     try:
-        for design, folder in zip(designs, folders, strict=True):
-            write_excitation_preview(design, folder)
+        for design, stage in zip(designs, stages, strict=True):
+            add_excitation_preview(design, stage)
     except MissingExtraError as error:
         return f"No preview.png: {error}."
     return ""
@@ -214,5 +222,5 @@ def _watch(progress: Callable[[str, float], None]) -> Progress:
     return tell
 
 
-def _folders(out: Path, count: int) -> list[Path]:
-    return [out] if count == 1 else [out / f"trajectory_{k + 1}" for k in range(count)]
+def _stages(stage: Stage, count: int) -> list[Stage]:
+    return [stage] if count == 1 else [stage.within(f"trajectory_{k + 1}") for k in range(count)]

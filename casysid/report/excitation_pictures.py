@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +9,10 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.excitation import ExcitationDesign, information_groups
-from casysid.excitation.output import expected_torque
+from casysid.excitation.output import expected_torque, identity_of
+from casysid.outputs import Stage, run_folder
 from casysid.report.labels import as_label
-from casysid.report.pictures import MEASURED, PREDICTED, RESIDUAL, figure
+from casysid.report.pictures import MEASURED, PREDICTED, RESIDUAL, figure, write_png
 from casysid.threads import single_threaded
 
 _POINTS = 1200
@@ -20,9 +20,18 @@ _POINTS = 1200
 
 @single_threaded()
 def write_excitation_pictures(design: ExcitationDesign, directory: str | Path) -> tuple[Path, ...]:
-    """Write pictures of joints, torque, distances (if any are kept), spectrum and information as PNG files."""
-    folder = Path(directory)
-    folder.mkdir(parents=True, exist_ok=True)
+    """Write pictures of joints, torque, distances (if any are kept), spectrum and information as PNG files.
+
+    Raises:
+        OutputError: They cannot be written, or the directory has pictures of another motion.
+    """
+    with run_folder(directory, identity_of(design), joining=True) as stage:
+        return add_excitation_pictures(design, stage)
+
+
+@single_threaded()
+def add_excitation_pictures(design: ExcitationDesign, stage: Stage) -> tuple[Path, ...]:
+    """Write the pictures to where a run's files wait; the paths that they will have."""
     pictures = {
         "joints.png": joint_figure(design),
         "torque.png": torque_figure(design),
@@ -33,10 +42,8 @@ def write_excitation_pictures(design: ExcitationDesign, directory: str | Path) -
     written = []
     for name, canvas in pictures.items():
         if canvas is not None:
-            partial = folder / f".{name}.{os.getpid()}.part"
-            canvas.savefig(partial, format="png", dpi=110)
-            os.replace(partial, folder / name)
-            written.append(folder / name)
+            write_png(canvas, stage.folder / name, dpi=110)
+            written.append(stage.home / name)
     return tuple(written)
 
 

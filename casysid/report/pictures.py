@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import base64
 import io
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from casysid.arrays import Array
 from casysid.identification import IdentificationResult, torque_band
+from casysid.outputs import whole_file
 from casysid.report.labels import as_label
 from casysid.report.tables import torque_unit
 from casysid.signals import Motion
@@ -68,6 +70,16 @@ def torque_figure(result: IdentificationResult) -> Any:
     axes[-1].set_xlabel("time [s]")
     canvas.align_ylabels(axes)
     return canvas
+
+
+def write_png(canvas: Any, path: Path, *, dpi: float) -> None:
+    """A figure as a PNG file, whole or not at all.
+
+    Raises:
+        OutputError: It cannot be written.
+    """
+    with whole_file(path) as stream:
+        canvas.savefig(stream, format="png", dpi=dpi)
 
 
 def inline_png(canvas: Any) -> str:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from casysid.identification.output import identity_of
+from casysid.outputs import Stage, run_folder
 from casysid.report.labels import as_label
-from casysid.report.pictures import MEASURED, MOST_POINTS, PREDICTED, RESIDUAL, figure
+from casysid.report.pictures import MEASURED, MOST_POINTS, PREDICTED, RESIDUAL, figure, write_png
 from casysid.report.tables import torque_unit
 from casysid.threads import single_threaded
 from casysid.validation import Rehearsal
@@ -23,23 +24,26 @@ SHOWN_SECONDS = 12.0
 
 @single_threaded()
 def write_rehearsal_pictures(rehearsal: Rehearsal, directory: str | Path) -> tuple[Path, ...]:
-    """Write ``torques.png``, ``tracking.png`` and ``parameters.png``, each whole or not at all; their paths."""
+    """Write ``torques.png``, ``tracking.png`` and ``parameters.png``, beside the rehearsal's other files; their paths.
+
+    Raises:
+        OutputError: They cannot be written, or the directory has pictures of another rehearsal.
+    """
+    with run_folder(directory, identity_of(rehearsal.result), joining=True) as stage:
+        return add_rehearsal_pictures(rehearsal, stage)
+
+
+@single_threaded()
+def add_rehearsal_pictures(rehearsal: Rehearsal, stage: Stage) -> tuple[Path, ...]:
+    """Write the pictures to where a run's files wait; the paths that they will have."""
     pictures = {
         "torques.png": rehearsed_torque_figure(rehearsal),
         "tracking.png": tracking_figure(rehearsal),
         "parameters.png": parameter_figure(rehearsal),
     }
-    folder = Path(directory)
-    folder.mkdir(parents=True, exist_ok=True)
-    return tuple(write_png(canvas, folder / name) for name, canvas in pictures.items())
-
-
-def write_png(canvas: Any, path: Path) -> Path:
-    """A figure as a PNG, through a temporary name; its path."""
-    temporary = path.with_name(path.name + ".part")
-    canvas.savefig(temporary, format="png", dpi=120)
-    os.replace(temporary, path)
-    return path
+    for name, canvas in pictures.items():
+        write_png(canvas, stage.folder / name, dpi=120)
+    return tuple(stage.home / name for name in pictures)
 
 
 def rehearsed_torque_figure(rehearsal: Rehearsal) -> Any:
