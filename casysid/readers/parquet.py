@@ -12,7 +12,7 @@ import numpy as np
 from casysid.archives import Unpackable, check_ratio
 from casysid.arrays import Array
 from casysid.errors import RecordingError
-from casysid.readers.table import from_row
+from casysid.readers.batches import from_row
 from casysid.recording.source import BATCH
 
 BUFFER = 1 << 18

@@ -17,7 +17,7 @@ from typing import Any, BinaryIO, TextIO
 from casysid.archives import GzipBytes, Unpackable
 from casysid.arrays import Array
 from casysid.errors import RecordingError
-from casysid.readers.table import from_row
+from casysid.readers.batches import from_row
 
 BLOCK = 1 << 22
 """Bytes of text that Arrow reads at once: some ten thousand rows."""
