@@ -32,8 +32,8 @@ NEAR_REST = 2.5
 """A joint slower than so many widths is near rest: beyond, the smooth sign is within 1.4 % of one."""
 MINIMUM_BLOCKS = 4
 """Of every recording: the fewest of which folds and scores tell anything."""
-EXCERPTS, EXCERPT_ROWS = 8, 1 << 15
-"""Of a long recording: half a minute each at 1 kHz. A motion of seven joints then takes some 60 MB."""
+EXCERPTS, EXCERPT_ROWS = 8, 1 << 14
+"""Of a long recording: a quarter of a minute each at 1 kHz. A motion of seven joints then takes some 30 MB."""
 
 Mask = npt.NDArray[np.bool_]
 
