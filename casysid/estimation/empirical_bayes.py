@@ -14,9 +14,9 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import ParameterError
-from casysid.estimation.base import Estimate, Estimator, Feasible
+from casysid.estimation.base import Estimate, Estimator, Feasible, Status
 from casysid.estimation.covariance import covariance_from_blocks
-from casysid.estimation.evidence import build_evidence_problem, centre_of
+from casysid.estimation.evidence import build_evidence_problem, centre_of, seen_columns
 from casysid.estimation.standardise import check_prior
 from casysid.moments import Moments
 
@@ -45,6 +45,8 @@ class EmpiricalBayes(Estimator):
     def estimate(self, moments: Moments, prior: Array | None = None) -> Estimate:
         """The posterior's mean at the sizes and variances of most evidence, its precision as the metric.
 
+        Columns without data have no part in the metric.
+
         Raises:
             ParameterError: The prior does not fit the columns.
         """
@@ -63,7 +65,8 @@ class EmpiricalBayes(Estimator):
             None if feasible is None else lambda mean, P, energy: feasible(centre + mean, P, energy) - centre,
         )
         weights = 1.0 / fit.variance
-        size = np.sqrt(fit.kappa / fit.size_by_column)
+        size, seen = np.sqrt(fit.kappa / fit.size_by_column), seen_columns(moments)
+        own = np.where(seen, size, 0.0)
         spread = None
         if self.standard_errors:
             K = problem.covariance / np.outer(size, size)
@@ -73,10 +76,10 @@ class EmpiricalBayes(Estimator):
             parameters=centre + fit.mean,
             covariance=fit.covariance if spread is None else spread.marked,
             spread=spread,
-            metric=moments.pooled(weights).xx + problem.precision * np.outer(size, size),
+            metric=moments.pooled(weights).xx + problem.precision * np.outer(own, own),
             noise_std=np.sqrt(fit.variance),
             rank=round(sum(fit.decided.values())),
-            status=fit.status,
+            status=fit.status if seen.any() else Status.DEGENERATE,
             diagnostics={
                 "score_inflation": fit.kappa,
                 "iterations": float(fit.iterations),

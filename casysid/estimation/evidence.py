@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.arrays import Array
 from casysid.estimation.base import Feasible, Status
@@ -39,6 +40,8 @@ VARIANCE_FLOOR = 1e-10
 """Of ``σ²`` over the mean square of the target: perfect data end there."""
 CAREFUL_ROUNDS = 3
 """Rounds with the update of expectation-maximisation, which cannot overshoot from the start."""
+UNDECIDED = 1e-6
+"""Of fewer parameters than this a group's size is left as it is: it is divided by them, and both are rounding."""
 INFLATION_EVERY = 8
 """Rounds from one ``κ`` to the next: it changes little, and costs as much as several rounds."""
 STEADY = 2e-2
@@ -68,15 +71,22 @@ def groups_of(columns: Sequence[str]) -> tuple[Group, ...]:
     return (*found, *(Group(kind, np.array(places)) for kind, places in kinds.items()))
 
 
+def seen_columns(moments: Moments) -> npt.NDArray[np.bool_]:
+    """Which columns have any energy, shape (p,); all of a link's do if one has."""
+    seen = np.zeros(len(moments.columns), dtype=bool)
+    for own, sums in zip(moments.row_columns, moments.squares, strict=True):
+        seen[own] |= np.einsum("bmm->m", sums)[:-1] > 0.0
+    for link in links_among(moments.columns):
+        seen[link] = seen[link].any()
+    return seen
+
+
 def centre_of(moments: Moments, prior: Array) -> Array:
     """About what parameters scatter, shape (p,): the prior for links, zero for drives, whose file values mean little.
 
     Columns that the data do not see keep the prior's value.
     """
-    seen = np.zeros(len(prior), dtype=bool)
-    for own, sums in zip(moments.row_columns, moments.squares, strict=True):
-        seen[own] |= np.einsum("bmm->m", sums)[:-1] > 0.0
-    centre = prior.copy()
+    seen, centre = seen_columns(moments), prior.copy()
     for group in groups_of(moments.columns):
         if group.name not in (LINKS, UNOWNED):
             centre[group.columns] = np.where(seen[group.columns], 0.0, prior[group.columns])
@@ -197,13 +207,14 @@ class EvidenceProblem:
         return min(max(len(g) - left, np.finfo(np.float64).eps), float(len(g)))
 
     def _sizes(self, delta: Array, C: Array, decided: Array, *, careful: bool) -> Array:
-        """MacKay's update; in the first rounds that of expectation-maximisation."""
+        """MacKay's update; that of expectation-maximisation in the first rounds, and where nothing is decided."""
         found = []
         for group, gamma in zip(self.groups, decided, strict=True):
             g = group.columns
             Q = self.precision[g[:, None], g]
             length = float(delta[g] @ Q @ delta[g])
-            found.append((length + float(np.sum(Q * C[g[:, None], g]))) / len(g) if careful else length / gamma)
+            open_still = (length + float(np.sum(Q * C[g[:, None], g]))) / len(g)
+            found.append(open_still if careful or gamma < UNDECIDED else length / gamma)
         return np.asarray(np.clip(np.array(found, dtype=np.float64), *SIZES))
 
     def _inflation(self, delta: Array, variance: Array) -> float:

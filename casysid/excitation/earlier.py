@@ -61,15 +61,17 @@ def after_result(problem: ExcitationProblem, path: str | Path) -> ExcitationProb
     place = place / "result.json" if place.is_dir() else place
     moments, regressor = read_moments(place.with_name("moments.npz")), problem.information.regressor
     missing = sorted(set(regressor.names) - set(moments.columns))
-    if missing or moments.joints != regressor.robot.dofs:
+    if missing or moments.away_from_rest().joints != regressor.robot.dofs:
         raise ParameterError(
             f"excitation: {place.parent} is of other joints or columns than this design; wanted the same, it lacks "
             f"{', '.join(missing[:6]) or 'joints'}. Take the robot and the friction columns that were identified"
         )
     samples = _samples(place)
-    averaged = samples / np.maximum(moments.count.sum(axis=0), 1.0)  # samples that went into a row
+    rows = np.bincount(moments.moving_rows, moments.count.sum(axis=0))[moments.moving_rows]  # of each joint in all
+    averaged = samples / np.maximum(rows, 1.0)  # samples that went into a row
     wanted = np.array([moments.columns.index(name) for name in regressor.names])
-    gram = moments.pooled(averaged * problem.information.noise_std**-2.0).xx
+    noise = problem.information.noise_std[[regressor.robot.dofs.index(moments.joints[k]) for k in moments.moving_rows]]
+    gram = moments.pooled(averaged * noise**-2.0).xx
     return problem.knowing_gram(_marginal(gram, wanted))
 
 

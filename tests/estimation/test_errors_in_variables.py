@@ -66,6 +66,34 @@ def test_heavy_noise_is_removed_only_as_far_as_is_safe(seed, overstated):
     assert limited.directions == np.sum(shares(loud) > 0.95) == estimate.diagnostics["directions_too_noisy"]
 
 
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(1e-3, 1e3))
+def test_what_is_left_is_positive_under_any_weights_of_the_joints(seed, loudness):
+    """Joints with rows of other columns, some without any, and noise of any shape, often more than there is in all."""
+    rng = np.random.default_rng(seed)
+    blocks, joints, p = 5, 3, 6
+    gram, noise = np.zeros((2, blocks, joints, p + 1, p + 1))
+    for joint in range(joints):
+        places = np.append(np.flatnonzero(rng.random(p) < 0.6), p)
+        for sums, size, rank in ((gram, 1.0, 4), (noise, loudness, rng.integers(1, 4))):
+            rows = np.sqrt(size) * rng.normal(size=(blocks, rank, len(places))) * 10.0 ** rng.uniform(-1, 1)
+            sums[:, joint, places[:, None], places] = np.swapaxes(rows, 1, 2) @ rows
+    moments = Moments.from_dense(gram, np.full((blocks, joints), 9.0), tuple("abcdef"), tuple("ijk"), noise=noise)
+    limited = limit_noise(moments, 0.95)
+    for weights in (np.ones(joints), *(10.0 ** rng.uniform(-6, 6, (3, joints)))):
+        left = limited.moments.denoised().pooled(weights).xx
+        size = np.sqrt(np.maximum(np.diag(moments.pooled(weights).xx), np.finfo(float).tiny))
+        assert np.linalg.eigvalsh(left / np.outer(size, size)).min() > -1e-9
+    for joint in range(joints):
+        shown = Moments((moments.squares[joint],), *_row(moments, joint), noise=(limited.moments.noise[joint],))
+        G, N = shown.pooled().xx, shown.pooled_noise()[:-1, :-1]
+        assert np.linalg.eigvalsh(0.95 * G - N).min() > -1e-9 * max(np.trace(G), 1.0)
+
+
+def _row(moments, joint):
+    return (moments.row_columns[joint],), moments.count[:, [joint]], moments.columns, (moments.joints[joint],)
+
+
 def test_one_hopeless_direction_does_not_spoil_the_others():
     """The third column is pure noise: the other two come out as if it were not there."""
     rng = np.random.default_rng(0)

@@ -9,6 +9,7 @@ from casysid.errors import ParameterError
 from casysid.estimation.base import Estimator, Status
 from casysid.estimation.bayesian import BayesianDenoising
 from casysid.estimation.denoising import Start
+from casysid.estimation.empirical_bayes import EmpiricalBayes
 from casysid.estimation.joint_factor_analysis import JointFactorAnalysis
 from casysid.estimation.lasso import LassoRegression
 from casysid.estimation.partial_least_squares import PartialLeastSquares
@@ -27,6 +28,7 @@ RIVALS: list[Estimator] = [
     PartialLeastSquares(components=2),
     RelevanceRegression(tolerance=1e-9),
     TotalLeastSquares(),
+    EmpiricalBayes(tolerance=1e-9, iterations=400),
 ]
 BAYESIAN: list[Estimator] = [
     BayesianDenoising(starts=(Start(0.1),)),

@@ -12,12 +12,12 @@ from casysid.accumulation import accumulate_moments
 from casysid.dynamics import Armature, Viscous, build_regressor
 from casysid.errors import ParameterError
 from casysid.estimation import ErrorsInVariables, WeightedLeastSquares
-from casysid.identification import Settings
-from casysid.identification.problem import MOTION_TO_TORQUE_BAND, build_problem
+from casysid.identification import Settings, prepare
+from casysid.identification.tuning.band import SMOOTHING_IN_EQUATIONS
 from casysid.recording import Recording
 from casysid.signals import BandAverage, NoiseLevels, build_smoother, position_noise
 from casysid.simulation import design_sinusoids
-from tests.simulated import bundled_robot
+from tests.simulated import bundled_robot, prepared
 
 RATE, CUTOFF = 400.0, 12.0
 
@@ -43,15 +43,16 @@ def test_noise_moments_of_an_acceleration_are_those_of_the_whole_linear_chain():
     """Armature's column is the acceleration: its noise is white noise through smoother, derivative and average."""
     sigma = 1e-3
     robot, recording, regressor, _, _ = noisy_recording(sigma, duration=4.0)
-    problem = build_problem(robot, [recording], CUTOFF, Settings(friction=(Armature(),), blocks=4))
-    smoother = build_smoother(recording.time, MOTION_TO_TORQUE_BAND * CUTOFF)
-    chain = smoother.smooth(np.eye(len(recording)), 2)
+    problem = prepared(robot, recording, Settings(cutoff=CUTOFF, friction=(Armature(),), blocks=4))
+    inner = np.flatnonzero(problem.motions[0].settled)
+    chain = build_smoother(recording.time, SMOOTHING_IN_EQUATIONS * CUTOFF).smooth(np.eye(len(recording)), 2)[inner]
     energy = 0.0
-    for block in np.array_split(np.arange(len(recording)), 4):
-        energy += np.sum((BandAverage(recording.time, CUTOFF).weights(block) @ chain[block]) ** 2)
+    for block in np.array_split(np.arange(len(inner)), 4):
+        energy += np.sum((BandAverage(recording.time[inner], CUTOFF).weights(block) @ chain[block]) ** 2)
     for joint in range(robot.nv):
         column = regressor.names.index(f"{robot.dofs[joint]}.armature")
-        gained = problem.moments.dense_noise[:, joint, column, column].sum()
+        rows = problem.moments.moving_rows == joint
+        gained = problem.moments.dense_noise[:, rows, column, column].sum()
         assert gained == pytest.approx(sigma**2 * energy, rel=0.4)
 
 
@@ -86,8 +87,7 @@ def unordered(levels, seed=0, duration=5.0):
 
 
 def problem_of(robot, recording, levels, blocks=4):
-    chosen = Settings(friction=(Viscous(), Armature()), input_noise=levels, blocks=blocks)
-    return build_problem(robot, [recording], None, chosen)
+    return prepared(robot, recording, Settings(friction=(Viscous(), Armature()), input_noise=levels, blocks=blocks))
 
 
 @given(st.integers(0, 1000), st.floats(1e-6, 1e-2))
@@ -106,8 +106,7 @@ def test_no_noise_adds_nothing(timed):
     robot, recording, *_ = unordered(NoiseLevels(position=0.0, velocity=0.0, acceleration=0.0))
     if timed:
         recording = dataclasses.replace(recording, time=np.arange(len(recording)) / RATE)
-    chosen = Settings(input_noise=levels, blocks=4)
-    moments = build_problem(robot, [recording], CUTOFF if timed else None, chosen).moments
+    moments = prepared(robot, recording, Settings(cutoff=CUTOFF, input_noise=levels, blocks=4)).moments
     assert np.abs(moments.dense_noise).max() <= 1e-12 * moments.gram.max()
 
 
@@ -173,7 +172,7 @@ def test_a_cutoff_far_too_high_costs_little_once_noise_is_removed():
     ratios = []
     for seed in range(3):
         robot, recording, regressor, reference, tau = noisy_recording(3e-3, seed=seed)
-        problem = build_problem(robot, [recording], CUTOFF, Settings(friction=(Armature(),)))
+        problem = prepared(robot, recording, Settings(cutoff=CUTOFF, friction=(Armature(),)))
         errors = []
         for method in (WeightedLeastSquares(), ErrorsInVariables(WeightedLeastSquares())):
             found = method.estimate(problem.moments, np.zeros(len(regressor.names))).parameters
@@ -183,7 +182,9 @@ def test_a_cutoff_far_too_high_costs_little_once_noise_is_removed():
     assert np.mean(ratios) < 0.2
 
 
-def test_noise_is_left_out_of_quick_problems():
-    robot, recording, *_ = noisy_recording(1e-3)
-    problem = build_problem(robot, [recording], CUTOFF, dataclasses.replace(Settings(), blocks=4), quick=True)
-    assert problem.moments.noise is None
+def test_noise_is_left_out_where_no_method_needs_it():
+    robot, recording, *_ = noisy_recording(1e-3, duration=4.0)
+    chosen = Settings(cutoff=CUTOFF, blocks=4, choose_friction=False, delay=0.0, time_scale=1.0)
+    assert prepare(robot, recording, chosen).moments.noise is None
+    known = dataclasses.replace(chosen, method=ErrorsInVariables())
+    assert prepare(robot, recording, known).moments.noise is not None

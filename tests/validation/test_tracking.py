@@ -9,12 +9,11 @@ from casysid.bundled import find_model
 from casysid.errors import CasysidWarning, ParameterError
 from casysid.estimation import OrdinaryLeastSquares
 from casysid.identification import Settings
-from casysid.identification.problem import build_problem
 from casysid.projection import build_projection, project
 from casysid.robot import Robot
 from casysid.simulation import PD, ControlModel, OperationalSpace, Plant, RunStatus, design_sinusoids, simulate
 from casysid.validation import measure_tracking, track, true_coefficients
-from tests.simulated import simulated_run
+from tests.simulated import prepared, simulated_run
 
 
 def test_errors_are_root_mean_squares_of_the_true_motion():
@@ -44,7 +43,7 @@ def arm():
     motion = design_sinusoids(robot, duration=4.0, seed=0, ramp=0.5)
     gains = PD.tuned(robot, plant.parameters)
     run = track(plant, ControlModel.from_robot(robot), gains, motion, rate=500.0, duration=4.0)
-    problem = build_problem(robot, [run.recording], 20.0, Settings())
+    problem = prepared(robot, run.recording, Settings(cutoff=20.0))
     estimate = OrdinaryLeastSquares().estimate(problem.moments)
     projection = build_projection(problem.regressor.parameters)
     answer = project(projection, estimate.parameters, estimate.metric, problem.regressor.prior)

@@ -6,7 +6,7 @@ the regression: minus the torque's slope, whose coefficient is the step.
 
 Friction, elasticity and filters also look late. So no delay, one for all joints, and one for each are hypotheses in
 the order of their simplicity (:mod:`casysid.identification.tuning.log_score`); a delay that shifts the motion's
-quickest part by less than a hundredth of a period is none.
+quickest part by less than a thousandth of a period is none.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from casysid.identification.tuning.held_out import FOLDS
 from casysid.identification.tuning.log_score import HeldOutScore, simplest_within_one_error
 from casysid.robot import Robot
 
-SMALLEST_IN_BAND = 0.01
-"""Periods of the motion's band: a shorter delay moves no part of the torque by more than 6 % of its amplitude."""
+SMALLEST_IN_BAND = 0.001
+"""Periods of the motion's band: a shorter delay moves no part of the torque by more than 0.6 % of its amplitude."""
 OWN_GAIN = 0.3
 """Fall of the torque error for which joints get delays of their own: then half of its energy goes. Their friction and
 elasticity look like delays, too, and one sampling card serves them all."""

@@ -6,8 +6,8 @@ import pytest
 from casysid.accumulation import accumulate_moments
 from casysid.dynamics import build_regressor
 from casysid.errors import ParameterError
-from casysid.identification import Settings
-from casysid.identification.torque_gains import scaled, settle_torque_gains
+from casysid.identification.tuning.drive_gains import choose_drive_gains, scaled
+from casysid.inertia import Consistency
 from casysid.simulation import design_sinusoids
 from tests.simulated import bundled_robot
 
@@ -52,7 +52,7 @@ def test_scaled_moments_are_those_of_scaled_rows():
 @pytest.mark.parametrize("seed", range(2))
 def test_honest_torques_are_left_alone(seed):
     regressor, moments = arm_moments(seed, np.ones(10))
-    found = settle_torque_gains(moments, regressor.parameters, Settings())
+    found = choose_drive_gains(moments, regressor.parameters, Consistency.FULL)
     assert not found.found
     assert (found.values == 1.0).all()
 
@@ -60,7 +60,7 @@ def test_honest_torques_are_left_alone(seed):
 @pytest.mark.parametrize("seed", [1])
 def test_gains_of_two_kinds_of_motors_are_found(seed):
     regressor, moments = arm_moments(seed, GAINS)
-    found = settle_torque_gains(moments, regressor.parameters, Settings())
+    found = choose_drive_gains(moments, regressor.parameters, Consistency.FULL)
     assert found.found
     near, far = np.log(found.values[:4]).mean(), np.log(found.values[4:7]).mean()
     assert far - near == pytest.approx(np.log(1.25 / 0.8), abs=0.15)
@@ -69,6 +69,6 @@ def test_gains_of_two_kinds_of_motors_are_found(seed):
 
 def test_what_is_given_is_taken_and_nothing_is_fitted_where_nothing_binds_the_joints():
     regressor, moments = arm_moments(0, GAINS)
-    given = settle_torque_gains(moments, regressor.parameters, Settings(torque_gains=tuple(GAINS)))
+    given = choose_drive_gains(moments, regressor.parameters, Consistency.FULL, given=tuple(GAINS))
     assert given.values == pytest.approx(GAINS)
-    assert not settle_torque_gains(moments, regressor.parameters, Settings(consistency=None)).found
+    assert not choose_drive_gains(moments, regressor.parameters, None).found
