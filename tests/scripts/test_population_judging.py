@@ -165,7 +165,7 @@ def test_an_answer_is_read_from_the_result_or_from_its_choices(load) -> None:
 
 def test_a_real_answer_predicts_the_fresh_motion(load) -> None:
     drawn = load("population.experiments").draw_frictionless(1, 0.01)
-    settings = Settings(cutoff=10.0, delay=0.0, choose_friction=False, coulomb_width=0.01, ends=True)
+    settings = Settings(cutoff=10.0, delay=0.0, choose_friction=False, coulomb_width=0.01)
     answer = load("population.candidate").ask(drawn.file, drawn.recording, settings)
     assert load("population.rivals").relative_error(answer.torque(*drawn.fresh), drawn.fresh_torque) < 0.02
     counts = load("population.coverage").intervals(drawn, answer)
