@@ -13,7 +13,8 @@ from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
 from casysid.errors import ParameterError
 from casysid.excitation.problem import ExcitationProblem
-from casysid.moments import read_moments
+from casysid.moments import NEAR_REST
+from casysid.moments_file import read_moments
 from casysid.recording import Recording
 from casysid.signals import motion_band, motion_from_recording
 from casysid.threads import single_threaded
@@ -60,16 +61,17 @@ def after_result(problem: ExcitationProblem, path: str | Path) -> ExcitationProb
     place = Path(path)
     place = place / "result.json" if place.is_dir() else place
     moments, regressor = read_moments(place.with_name("moments.npz")), problem.information.regressor
+    moving = moments.away_from_rest()
     missing = sorted(set(regressor.names) - set(moments.columns))
-    if missing or moments.joints != regressor.robot.dofs:
+    if missing or moving.joints != regressor.robot.dofs:
         raise ParameterError(
             f"excitation: {place.parent} is of other joints or columns than this design; wanted the same, it lacks "
             f"{', '.join(missing[:6]) or 'joints'}. Take the robot and the friction columns that were identified"
         )
-    samples = _samples(place)
-    averaged = samples / np.maximum(moments.count.sum(axis=0), 1.0)  # samples that went into a row
+    of_joint = np.array([[name.removesuffix(NEAR_REST) == dof for name in moments.joints] for dof in moving.joints])
+    averaged = _samples(place) / np.maximum(of_joint @ moments.count.sum(axis=0), 1.0)  # samples that went into a row
     wanted = np.array([moments.columns.index(name) for name in regressor.names])
-    gram = moments.pooled(averaged * problem.information.noise_std**-2.0).xx
+    gram = moving.pooled(averaged * problem.information.noise_std**-2.0).xx
     return problem.knowing_gram(_marginal(gram, wanted))
 
 
