@@ -5,6 +5,7 @@ import importlib
 import inspect
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -55,6 +56,24 @@ def test_imports_go_one_way(path):
         parts = module.split(".")
         if parts[0] == "casysid" and len(parts) > 1:
             assert LEVEL[parts[1]] <= own, f"{path.name} imports {module}, which comes after it"
+
+
+@pytest.mark.parametrize("rooms", [("recording", "readers")])
+def test_no_file_imports_itself_through_others(rooms):
+    files = {".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): path for path in FILES}
+    inside = {name: path for name, path in files.items() if room_of(path) in rooms}
+    graph = {name: (imported_modules(path) - typed_only(path)) & inside.keys() for name, path in inside.items()}
+    TopologicalSorter(graph).prepare()  # raises CycleError, which names the files
+
+
+def typed_only(path: Path) -> set[str]:
+    """Modules that are imported for type checkers only."""
+    guards = [
+        node
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+    ]
+    return {node.module for guard in guards for node in guard.body if isinstance(node, ast.ImportFrom) and node.module}
 
 
 @pytest.mark.parametrize(

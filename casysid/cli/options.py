@@ -12,7 +12,7 @@ from casysid.cli.ranges import check_options, checked, numbers
 
 if TYPE_CHECKING:
     from casysid.identification import Settings
-    from casysid.recording import Recording
+    from casysid.recording import Source
     from casysid.robot import Robot
     from casysid.signals import NoiseLevels
 
@@ -111,12 +111,16 @@ def load_robot(
 
 def load_recordings(
     robot: Robot, logs: list[Path], held_out: list[Path] | None, split: float | None
-) -> tuple[list[Recording], list[Recording]]:
+) -> tuple[list[Source], list[Source]]:
     """The fitted and the held-out recordings."""
-    from casysid.recording import read_recordings
+    from casysid.identification.passes import is_long
+    from casysid.recording import Source, open_recordings
 
     check_options(split=split)
-    fitted, unseen = list(read_recordings(logs, robot)), list(read_recordings(held_out or [], robot))
+    fitted, unseen = list[Source](), list[Source]()
+    for files, several in ((logs, fitted), (held_out or [], unseen)):
+        opened = open_recordings(files, robot)
+        several += opened if is_long(opened) else [one.in_memory() for one in opened]
     if split is None:
         return fitted, unseen
     halves = [recording.split(split) for recording in fitted]

@@ -2,8 +2,8 @@
 
 Deviations ``δ = θ - θ0`` of a group are Gaussian with covariance ``λ_g K_g``: the shape ``K_g`` is known beforehand,
 the size ``λ_g`` maximises the evidence, as do the variances ``σ_j²`` with what the fit took away given back. The
-likelihood is raised to the power ``1/κ``, because residuals are coloured and averaging windows overlap: ``κ`` is the variance of
-the blocks' scores over that of white residuals.
+likelihood is raised to the power ``1/κ``, because residuals are coloured and averaging windows overlap: ``κ`` is the
+variance of the blocks' scores over that of white residuals.
 
 Where parameters have to be possible, the posterior's mode among the possible ones takes the place of its mean: a prior
 that lets masses be negative would explain with them what is an offset of the sensor.
@@ -42,7 +42,8 @@ CAREFUL_ROUNDS = 3
 INFLATION_EVERY = 8
 """Rounds from one ``κ`` to the next: it changes little, and costs as much as several rounds."""
 STEADY = 2e-2
-"""Change of ``log λ`` that ends the search: a hundredth in a deviation."""
+"""Change of ``log λ`` that ends the search: a hundredth in a deviation; that of a group of which the data decide less
+than one parameter counts by so much less."""
 LINKS, UNOWNED = "links", "columns"
 """Names of the groups that are measured from the prior; drives are measured from zero."""
 
@@ -154,7 +155,7 @@ class EvidenceProblem:
             variance = self._variances(totals, delta, C)
             decided = np.array([self._decided(group, C, size) for group, size in zip(self.groups, sizes, strict=True)])
             wanted: Array = self._sizes(delta, C, decided, careful=iteration <= CAREFUL_ROUNDS)
-            change = float(np.abs(np.log(wanted / sizes)).max(initial=0.0))
+            change = float((np.abs(np.log(wanted / sizes)) * np.minimum(decided, 1.0)).max(initial=0.0))
             sizes = wanted
             if iteration % INFLATION_EVERY == 1:
                 kappa = self._inflation(delta, variance)

@@ -11,6 +11,7 @@ from casysid.errors import RecordingError
 from casysid.readers.columns import Layout, listing
 from casysid.readers.statistics import FASTEST, Statistics
 from casysid.readers.table import Table
+from casysid.robot import JointKind, Robot
 
 FEWEST = 20
 """Fewer rows than this are no recording."""
@@ -174,3 +175,20 @@ def check_steps(table: Table, layout: Layout, statistics: Statistics) -> None:
             f"before {table.place(int(row))}, faster than {FASTEST:g} a second, which no joint is ({leaps.leaps[k]} "
             "steps); cut out the glitch, or check the units of q and time"
         )
+
+
+def check_quaternions(statistics: Statistics, robot: Robot) -> None:
+    """Refuse orientations whose quaternions are not of unit length within 1 %.
+
+    Raises:
+        RecordingError: Naming the joint.
+    """
+    for joint in robot.joints:
+        if joint.kind in (JointKind.SPHERICAL, JointKind.FREE_FLYER):
+            length, row = statistics.worst_quaternion[joint.name]
+            if abs(length - 1.0) > 0.01:
+                names = robot.channels[joint.channels][-4:]
+                raise RecordingError(
+                    f"{statistics.label}: the quaternion of '{joint.name}' ({listing(names)}) has length "
+                    f"{length:.4g} in sample {row + 1}, wanted 1; check which columns they are (w comes last)"
+                )

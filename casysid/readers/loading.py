@@ -10,14 +10,16 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import RecordingError
-from casysid.readers.angles import check_quaternions, unwrap, unwrapped_sentences
-from casysid.readers.checks import SampleChecks, check_steps
+from casysid.readers.angles import unwrap
+from casysid.readers.batches import all_rows
+from casysid.readers.checks import SampleChecks, check_quaternions, check_steps
 from casysid.readers.columns import Layout, match_columns
 from casysid.readers.statistics import Statistics
-from casysid.readers.table import Table, all_rows, open_table
+from casysid.readers.table import Table, open_table
 from casysid.readers.units import check_units
 from casysid.readers.weaknesses import find_weaknesses
-from casysid.recording import Recording, RecordingFile
+from casysid.recording.file import RecordingFile
+from casysid.recording.recording import Recording
 from casysid.robot import Robot
 from casysid.threads import single_threaded
 
@@ -50,7 +52,7 @@ def _load(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]]:
     logged = _recording(columns, layout, robot, _about(path, table, layout))
     wrapped = _wrapped(statistics)
     recording = next(unwrap([logged], wrapped)) if wrapped else logged
-    return recording, (*unwrapped_sentences(statistics, robot), *find_weaknesses(statistics, robot))
+    return recording, find_weaknesses(statistics, robot)
 
 
 @single_threaded()
@@ -79,7 +81,7 @@ def scan_recording(path: Path, robot: Robot) -> tuple[RecordingFile, tuple[str, 
         sources=about["sources"],
         unused_columns=about["unused_columns"],
     )
-    return recording, (*unwrapped_sentences(statistics, robot), *find_weaknesses(statistics, robot))
+    return recording, find_weaknesses(statistics, robot)
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,11 @@ class LogFile:
     channels: tuple[str, ...]
     dofs: tuple[str, ...]
     wrapped: tuple[int, ...]
+
+    @property
+    def seekable(self) -> bool:
+        """Whether samples far into the file are found without reading all before them."""
+        return self.table.seekable and not self.wrapped
 
     def read(self, first: int = 0, *, time_only: bool = False) -> Iterator[Recording]:
         """All samples from row ``first`` on, in consecutive batches.

@@ -35,6 +35,11 @@ class NpzTable:
         """Column names, matrices spread out."""
         return tuple(self.columns)
 
+    @property
+    def seekable(self) -> bool:
+        """See :class:`~casysid.readers.table.Table`."""
+        return True
+
     def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
         """The named columns batch by batch; see :class:`~casysid.readers.table.Table`."""
         keys = list(dict.fromkeys(self.columns[name][0] for name in names))

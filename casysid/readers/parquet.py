@@ -12,7 +12,7 @@ import numpy as np
 from casysid.archives import Unpackable, check_ratio
 from casysid.arrays import Array
 from casysid.errors import RecordingError
-from casysid.readers.table import from_row
+from casysid.readers.batches import from_row
 from casysid.recording.source import BATCH
 
 BUFFER = 1 << 18
@@ -30,6 +30,11 @@ class ParquetTable:
 
     path: Path
     names: tuple[str, ...]
+
+    @property
+    def seekable(self) -> bool:
+        """See :class:`~casysid.readers.table.Table`."""
+        return True
 
     def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
         """The named columns batch by batch; see :class:`~casysid.readers.table.Table`."""

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from casysid.arrays import Array
 from casysid.readers.angles import RARELY, TURN, angle_joints, whole_turns
 from casysid.readers.steps import StepStatistics
-from casysid.recording import Facts, Recording
+from casysid.recording.file import Facts
+from casysid.recording.recording import Recording
 from casysid.recording.resolution import ResolutionScan
 from casysid.recording.spectrum import SpectrumScan
 from casysid.robot import Joint, JointKind, Robot

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Protocol
-
-import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import RecordingError
@@ -23,6 +21,11 @@ class Table(Protocol):
     @property
     def names(self) -> tuple[str, ...]:
         """Column names in the file's order."""
+        ...
+
+    @property
+    def seekable(self) -> bool:
+        """Whether rows far into the file are found without reading all before them."""
         ...
 
     def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
@@ -78,21 +81,6 @@ def open_table(path: Path) -> Table:
     raise RecordingError(
         f"{path}: '{suffix or path.name}' is no known kind of log; convert it to one of {', '.join(SUFFIXES)}"
     )
-
-
-def from_row(batches: Iterable[dict[str, Array]], first: int) -> Iterator[dict[str, Array]]:
-    """Batches without the rows before ``first``."""
-    for columns in batches:
-        rows = len(next(iter(columns.values())))
-        if first < rows:
-            yield {name: values[first:] for name, values in columns.items()} if first else columns
-        first = max(first - rows, 0)
-
-
-def all_rows(names: Sequence[str], batches: Iterable[dict[str, Array]]) -> dict[str, Array]:
-    """Consecutive batches of the named columns as one."""
-    parts = list(batches)
-    return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in names}
 
 
 def _refuse_no_file(path: Path) -> None:

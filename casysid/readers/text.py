@@ -17,7 +17,7 @@ from typing import Any, BinaryIO, TextIO
 from casysid.archives import GzipBytes, Unpackable
 from casysid.arrays import Array
 from casysid.errors import RecordingError
-from casysid.readers.table import from_row
+from casysid.readers.batches import from_row
 
 BLOCK = 1 << 22
 """Bytes of text that Arrow reads at once: some ten thousand rows."""
@@ -46,6 +46,11 @@ class TextTable:
     header_line: int
     delimiter: str
     decimal: str
+
+    @property
+    def seekable(self) -> bool:
+        """See :class:`~casysid.readers.table.Table`."""
+        return False
 
     def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
         """The named columns batch by batch; see :class:`~casysid.readers.table.Table`."""

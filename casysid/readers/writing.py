@@ -14,21 +14,6 @@ from casysid.arrays import Array
 from casysid.errors import RecordingError
 from casysid.outputs import whole_file
 from casysid.readers.table import PARQUET_SUFFIXES, SUFFIXES, suffix_of
-from casysid.recording import Recording
-
-
-def columns_of(recording: Recording) -> dict[str, Array]:
-    """The recording's arrays as columns, named by the convention."""
-    columns = {} if recording.time is None else {"time": recording.time}
-    for letter, names, values in (
-        ("q", recording.channels, recording.position),
-        ("v", recording.dofs, recording.velocity),
-        ("a", recording.dofs, recording.acceleration),
-        ("tau", recording.dofs, recording.torque),
-    ):
-        if values is not None:
-            columns |= {f"{letter}_{name}": column for name, column in zip(names, values.T, strict=True)}
-    return columns
 
 
 def write_columns(path: Path, columns: Mapping[str, Array]) -> Path:

@@ -70,10 +70,12 @@ class Motion:
 
     def without_ends(self) -> Motion:
         """The settled samples only."""
-        if self.settled.all():
-            return self
+        return self if self.settled.all() else self.rows(self.settled)
+
+    def rows(self, chosen: slice | npt.NDArray[np.bool_]) -> Motion:
+        """Some samples only, in the order of time."""
         kept = ("time", "q", "v", "a", "tau", "standing", "settled")
-        return dataclasses.replace(self, **{name: getattr(self, name)[self.settled] for name in kept})
+        return dataclasses.replace(self, **{name: getattr(self, name)[chosen] for name in kept})
 
     def decimated(self, stride: int) -> Motion:
         """Torque averaged over ``stride`` samples, the motion at their middle: for rates far above the low-pass.

@@ -127,7 +127,7 @@ def test_gaps_are_counted_and_cut_the_recording_into_segments(arm: Robot, column
     recording, said = read(tmp_path, kept, arm)
     assert said == [
         "2 gaps in time, the largest 0.81 s after 1.99 s (the usual step is 0.01 s); "
-        "the stretches between them are smoothed one by one"
+        "what one parts that is long beside the low-pass is smoothed piece by piece"
     ]
     assert [(s.start, s.stop) for s in recording.segments] == [(0, 100), (100, 150), (150, 270)]
     assert recording.rate == pytest.approx(100.0)

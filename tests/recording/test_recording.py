@@ -156,7 +156,8 @@ def test_what_is_written_is_read_back_exactly(recording: Recording, suffix: str)
 @LAWS
 @given(hnp.arrays(np.float64, 20, elements=st.floats(allow_nan=False, allow_infinity=False)), st.sampled_from(SUFFIXES))
 def test_every_finite_number_survives_writing(values: np.ndarray, suffix: str) -> None:
-    from casysid.readers.table import all_rows, open_table
+    from casysid.readers.batches import all_rows
+    from casysid.readers.table import open_table
 
     with tempfile.TemporaryDirectory() as folder:
         path = write_columns(Path(folder) / f"log{suffix}", {"x": values, 'tau_a "b", c': values})
