@@ -56,7 +56,7 @@ def check_ratio(packed: int, unpacked: int) -> None:
         )
 
 
-def array_headers(path: Path) -> dict[str, ArrayHeader]:
+def array_headers(path: str | Path) -> dict[str, ArrayHeader]:
     """The arrays of an NPZ archive by name, from their headers alone; each is as large as its shape says.
 
     Raises:
@@ -64,7 +64,7 @@ def array_headers(path: Path) -> dict[str, ArrayHeader]:
         OSError: The file cannot be opened.
     """
     headers: dict[str, ArrayHeader] = {}
-    with path.open("rb") as stream:
+    with open(path, "rb") as stream:
         for member, name in _members(stream):
             if name in headers:
                 raise Unpackable(f"array '{name}' is there twice; keep one")
@@ -72,7 +72,7 @@ def array_headers(path: Path) -> dict[str, ArrayHeader]:
     return headers
 
 
-def read_arrays(path: Path, names: Iterable[str]) -> dict[str, np.ndarray[Any, Any]]:
+def read_arrays(path: str | Path, names: Iterable[str]) -> dict[str, np.ndarray[Any, Any]]:
     """Some arrays of an NPZ archive, none of them of Python objects.
 
     Raises:
@@ -85,7 +85,7 @@ def read_arrays(path: Path, names: Iterable[str]) -> dict[str, np.ndarray[Any, A
         raise Unpackable(f"there is no array '{missing[0]}'")
     check_ratio(sum(headers[name].packed for name in wanted), sum(headers[name].size for name in wanted))
     arrays = {}
-    with path.open("rb") as stream:
+    with open(path, "rb") as stream:
         for name in wanted:
             arrays[name] = _read_array(stream, name)
     return arrays

@@ -17,7 +17,7 @@ ORDER = (
     ("nlp", "inertia"),
     ("robot", "bundled"),
     ("recording", "readers", "dynamics"),
-    ("signals", "moments", "accumulation"),
+    ("signals", "moments", "moments_file", "accumulation"),
     ("identifiability",),
     ("estimation", "projection", "excitation"),
     ("uncertainty",),
@@ -121,7 +121,8 @@ def public_functions():
 def test_paths_may_be_strings(name):
     for argument, parameter in inspect.signature(public_functions()[name]).parameters.items():
         kind = str(parameter.annotation)
-        assert "Path" not in kind or "str" in kind, f"{argument}: {kind}"
+        if not kind.startswith("Callable"):  # what casysid calls is given paths
+            assert "Path" not in kind or "str" in kind, f"{argument}: {kind}"
 
 
 def test_importing_the_command_line_loads_nothing_heavy():

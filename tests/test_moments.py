@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from casysid.errors import ParameterError
-from casysid.moments import Moments, read_moments, write_moments
+from casysid.moments import Moments
+from casysid.moments_file import read_moments, write_moments
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -205,8 +206,8 @@ def test_what_is_no_moments_file_is_refused(tmp_path, content):
     ("changed", "message"),
     [
         ({"gram": np.full((1, 1, 3, 3), 1j)}, "holds complex128"),
-        ({"gram": -np.ones((1, 1, 3, 3))}, "no sum of squares"),
-        ({"gram": np.triu(np.ones((1, 1, 3, 3)))}, "no sum of squares"),
+        ({"gram": -np.ones((1, 1, 3, 3))}, "no sums of squares"),
+        ({"gram": np.triu(np.ones((1, 1, 3, 3)))}, "no sums of squares"),
         ({"gram": np.full((1, 1, 3, 3), np.nan)}, "must be finite"),
         ({"count": np.full((1, 1), -1.0)}, "a count is negative"),
         ({"columns": np.array(["a", "a"])}, "a column is there twice"),

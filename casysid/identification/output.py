@@ -9,7 +9,7 @@ from pathlib import Path
 from casysid.identification.plain_friction import nearest_plain_friction
 from casysid.identification.result import JOINT_KINDS, IdentificationResult, without_infinities
 from casysid.identification.verdict import judge
-from casysid.moments import write_moments
+from casysid.moments_file import write_moments
 from casysid.outputs import Stage, run_folder, write_whole
 from casysid.robot import write_robot
 
@@ -57,7 +57,7 @@ def write_json(content: object, path: str | Path) -> None:
     Raises:
         OutputError: The file cannot be written.
     """
-    write_whole(Path(path), _json(content))
+    write_whole(path, _json(content))
 
 
 def _json(content: object) -> bytes:

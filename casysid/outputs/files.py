@@ -30,7 +30,7 @@ _ADVICE = {errno.ENOSPC: "Make room there, or name another place", errno.EDQUOT:
 
 
 @contextmanager
-def whole_file(path: Path, *, keep_as: Path | None = None) -> Iterator[IO[bytes]]:
+def whole_file(path: str | Path, *, keep_as: str | Path | None = None) -> Iterator[IO[bytes]]:
     """A stream to a temporary file beside ``path``, which replaces ``path`` once the context has ended without error.
 
     Args:
@@ -40,6 +40,7 @@ def whole_file(path: Path, *, keep_as: Path | None = None) -> Iterator[IO[bytes]
     Raises:
         OutputError: It cannot be written; nothing is left behind, and a file that was there is as it was.
     """
+    path, kept = Path(path), Path(keep_as or path)
     with blaming(path):
         require_replaceable(path)
         remove_leftovers(path.parent)
@@ -49,17 +50,17 @@ def whole_file(path: Path, *, keep_as: Path | None = None) -> Iterator[IO[bytes]
             with stream:
                 yield stream
             os.fsync(descriptor)
-            os.replace(stream.name, keep_as or path)
+            os.replace(stream.name, kept)
         except BaseException:
             with suppress(OSError):
                 os.unlink(stream.name)
             raise
         finally:
             os.close(descriptor)
-        sync_folder((keep_as or path).parent)
+        sync_folder(kept.parent)
 
 
-def write_whole(path: Path, content: bytes) -> Path:
+def write_whole(path: str | Path, content: bytes) -> Path:
     """Some bytes as a file, whole or not at all; its path.
 
     Raises:
@@ -67,15 +68,16 @@ def write_whole(path: Path, content: bytes) -> Path:
     """
     with whole_file(path) as stream:
         stream.write(content)
-    return path
+    return Path(path)
 
 
-def check_output_file(path: Path) -> None:
+def check_output_file(path: str | Path) -> None:
     """Nothing, if a file can be written there; nothing is left there.
 
     Raises:
         OutputError: It cannot; the message says why.
     """
+    path = Path(path)
     with blaming(path):
         require_replaceable(path)
         if path.is_symlink() and not path.exists():

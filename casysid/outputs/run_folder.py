@@ -111,12 +111,13 @@ def run_folder(
             written(home)
 
 
-def add_to_run(path: Path, content: bytes, identity: str) -> Path:
+def add_to_run(path: str | Path, content: bytes, identity: str) -> Path:
     """A further file of a run: beside the others if they are in its folder, else on its own; its path.
 
     Raises:
         OutputError: It cannot be written, or the folder holds a file of this name that belongs to another run.
     """
+    path = Path(path)
     if not Manifest.of(path.parent).files:
         return write_whole(path, content)
     with run_folder(path.parent, identity, joining=True) as stage:
@@ -124,7 +125,7 @@ def add_to_run(path: Path, content: bytes, identity: str) -> Path:
     return path
 
 
-def check_run_folder(directory: Path, names: Sequence[str] = (), room: int = 0) -> None:
+def check_run_folder(directory: str | Path, names: Sequence[str] = (), room: int = 0) -> None:
     """Nothing, if a run's files can be written there; what a killed run left there is put in order.
 
     Args:
@@ -135,6 +136,7 @@ def check_run_folder(directory: Path, names: Sequence[str] = (), room: int = 0) 
     Raises:
         OutputError: They cannot; the message says why.
     """
+    directory = Path(directory)
     with blaming(directory), _folder(directory, keep=False):
         for name in (*names, MANIFEST):
             require_replaceable(directory / name)

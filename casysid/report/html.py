@@ -42,7 +42,7 @@ def write_report(result: IdentificationResult, path: str | Path) -> None:
     Raises:
         OutputError: It cannot be written, or the folder has a report of another result, which has replaced this one.
     """
-    add_to_run(Path(path), _bytes(result), identity_of(result))
+    add_to_run(path, _bytes(result), identity_of(result))
 
 
 @single_threaded()

@@ -41,7 +41,7 @@ def write_robot(
     damping: npt.ArrayLike | None = None,
     dry_friction: npt.ArrayLike | None = None,
     armature: npt.ArrayLike | None = None,
-    keep_as: Path | None = None,
+    keep_as: str | Path | None = None,
 ) -> WrittenModel:
     """Writes the robot's file with other parameters; everything else in it stays.
 
