@@ -24,9 +24,7 @@ UNIT = {JointKind.REVOLUTE: "N m", JointKind.PRISMATIC: "N"}
 @pytest.fixture(scope="module")
 def result():
     runs = [simulated_run("two_link", seed, PlantSettings()).recording for seed in (0, 1)]
-    settings = Settings(
-        method=ErrorsInVariables(), cutoff=20.0, coulomb_width=0.02, delay=0.0, choose_friction=False
-    )
+    settings = Settings(method=ErrorsInVariables(), cutoff=20.0, coulomb_width=0.02, delay=0.0, choose_friction=False)
     return identify(bundled_robot("two_link"), runs[0], settings, held_out=runs[1:])
 
 

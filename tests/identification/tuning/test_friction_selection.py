@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 import typer
+from casysid.identification.friction_choice import choose_friction
 from typer.testing import CliRunner
 
 from casysid.cli.identify import identify as identify_verb
@@ -23,7 +24,6 @@ from casysid.dynamics import (
 )
 from casysid.errors import ParameterError
 from casysid.identification import Settings, identify
-from casysid.identification.friction_choice import choose_friction
 from casysid.identification.friction_laws import broken_laws, friction_laws
 from casysid.identification.friction_model import model_from_json, model_to_json
 from casysid.identification.output import write_result

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from casysid.identification.friction_evidence import Candidate, build_evidence, choose_candidates
+from casysid.identification.friction_trial import LEAST_STRENGTH, HeldOutErrors
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from casysid.identification.friction_evidence import Candidate, build_evidence, choose_candidates
-from casysid.identification.friction_trial import LEAST_STRENGTH, HeldOutErrors
 from casysid.moments import Moments
 
 ROWS, BLOCKS, KNOWN, TRIED = 2000, 20, 6, 12
