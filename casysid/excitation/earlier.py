@@ -13,7 +13,7 @@ from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
 from casysid.errors import ParameterError
 from casysid.excitation.problem import ExcitationProblem
-from casysid.moments import read_moments
+from casysid.moments_file import read_moments
 from casysid.recording import Recording
 from casysid.signals import motion_band, motion_from_recording
 from casysid.threads import single_threaded
