@@ -2,11 +2,13 @@
 # make test   set up and pass the tests
 # make lint   style and types
 # make test-environments   the tests once for every number of threads and kind of processor (TESTS="tests/nlp ..." for some)
+# make fuzz   an hour of damaged files and command lines (FUZZ_SECONDS=60 make fuzz: a minute)
 PYTHON ?= python3
 VENV   ?= .venv
 OUT    ?= out/demo
+FUZZ_SECONDS ?= 3600
 
-.PHONY: demo test test-environments lint setup clean
+.PHONY: demo test test-environments lint fuzz setup clean
 .DEFAULT_GOAL := demo
 
 setup: $(VENV)/.ready
@@ -28,6 +30,9 @@ lint: setup
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+
+fuzz: setup
+	OMP_NUM_THREADS=1 $(VENV)/bin/python -m tests.fuzz --seconds $(FUZZ_SECONDS)
 
 clean:
 	rm -rf $(VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from casysid.inertia import Consistency as Consistency
     from casysid.moments import Moments as Moments
     from casysid.recording import Recording as Recording
+    from casysid.recording import open_recording as open_recording
+    from casysid.recording import open_recordings as open_recordings
     from casysid.recording import read_recording as read_recording
     from casysid.recording import read_recordings as read_recordings
     from casysid.report import write_report as write_report
@@ -64,6 +66,8 @@ _HOMES = {
     "find_model": "casysid.bundled",
     "generate_c": "casysid.dynamics",
     "identify": "casysid.identification",
+    "open_recording": "casysid.recording",
+    "open_recordings": "casysid.recording",
     "prepare": "casysid.identification",
     "read_recording": "casysid.recording",
     "read_recordings": "casysid.recording",

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from casysid.arrays import Array
 from casysid.dynamics.regressor import Regressor
 from casysid.errors import ParameterError
+from casysid.memory import moments_memory, require_memory
 from casysid.moments import NEAR_REST, Moments
 from casysid.signals.averaging import BandAverage, WindowSums
 from casysid.threads import single_threaded
@@ -60,7 +61,8 @@ def accumulate_moments(
         progress: Called with the number of samples done and of all.
 
     Raises:
-        ParameterError: When a shape does not fit, a sample is not finite, or there is no sample.
+        ParameterError: When a shape does not fit, a sample is not finite, there is no sample, or the moments would not
+            fit into memory.
     """
     histories = regressor.histories(q, None if average is None else average.time)
     inputs, samples = regressor.equations.check((q, v, a, tau, *histories))
@@ -77,6 +79,7 @@ def accumulate_moments(
     if apart is not None:
         joints, rows_of = (*joints, *(f"{joint}{NEAR_REST}" for joint in joints)), (*rows_of, *rows_of)
         widths = [*widths, *widths]
+    _require_memory(regressor, len(groups))
     sums, counts = [np.zeros((len(groups), width, width)) for width in widths], np.zeros((len(groups), len(widths)))
     with single_threaded():
         if average is None:
@@ -123,6 +126,16 @@ def _sorted_rows(
     moving = shares[-joints:].T <= LARGEST_INVALID_SHARE
     valid = np.ones_like(moving) if kept is None else kept
     return np.vstack([values, values]), widths, np.hstack([valid & moving, valid & ~moving])
+
+
+def _require_memory(regressor: Regressor, blocks: int) -> None:
+    """Refuse moments that the machine could not hold in a fit."""
+    joints, p = regressor.robot.nv, len(regressor.names)
+    require_memory(
+        moments_memory([len(columns) for columns in regressor.row_columns], blocks, p),
+        f"moments: a fit of {joints} joints, {p} columns and {blocks} blocks",
+        "Lock joints that do not move, take fewer blocks, or a machine with more memory",
+    )
 
 
 def _reported(

@@ -29,8 +29,11 @@ def find_model(name: str | Path) -> Path:
         RobotError: There is no such file and no such model; the message lists the models.
     """
     path, directory = Path(name), _directory()
-    if path.is_file():
-        return path
+    try:
+        if path.is_file():
+            return path
+    except OSError as error:  # such as a name longer than the file system's
+        raise RobotError(f"robot '{name}': cannot be opened: {error.strerror}") from error
     if directory is not None and path.name == str(name):
         for suffix in (path.suffix,) if path.suffix in _SUFFIXES else _SUFFIXES:
             stem = path.name.removesuffix(suffix)

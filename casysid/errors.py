@@ -20,6 +20,10 @@ class ParameterError(CasysidError, ValueError):
     """A setting or a parameter vector is outside what makes sense."""
 
 
+class OutputError(CasysidError):
+    """Files cannot be written where they were asked for."""
+
+
 class SolverError(CasysidError):
     """A numerical solver ended without an answer that can be stood by."""
 

@@ -18,6 +18,7 @@ from scipy.linalg import solve_triangular
 
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
+from casysid.memory import NUMBER, require_memory
 from casysid.moments import Moments
 from casysid.robot import Robot
 from casysid.robot.coordinates import state_from_channels
@@ -32,6 +33,8 @@ PANEL = 64
 FEWEST_STATES = 40
 STATES_PER_COLUMN = 2
 """Random states for each column of the longest row: twice as many equations of one joint as it has unknowns."""
+MATRICES = 8
+"""Of all columns by all columns at once: sums, scaled sums, factor, weights, and what their making takes."""
 COEFFICIENT_TOLERANCE = 1e-3
 """Weights in a combination below this fraction of its largest are left out of the words."""
 
@@ -140,7 +143,17 @@ def _eliminate(S: Array, live: Array, smallest: float) -> tuple[npt.NDArray[np.i
 
 @single_threaded()
 def structural_base_parameters(regressor: Regressor, *, samples: int = 0, seed: int = 0) -> BaseParameters:
-    """Base parameters of the mechanism itself, from random states within its limits (Gautier 1991)."""
+    """Base parameters of the mechanism itself, from random states within its limits (Gautier 1991).
+
+    Raises:
+        ParameterError: There are more columns than fit into memory.
+    """
+    p = len(regressor.names)
+    require_memory(
+        MATRICES * NUMBER * float(p) ** 2,
+        f"finding base parameters of {p} columns",
+        "Lock joints that are of no interest",
+    )
     count = samples or FEWEST_STATES + STATES_PER_COLUMN * max(map(len, regressor.row_columns), default=0)
     rng = np.random.default_rng(seed)
     q, v, a = random_states(regressor.robot, count, rng)

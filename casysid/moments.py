@@ -12,12 +12,9 @@ the squares of its own columns and no others.
 from __future__ import annotations
 
 import dataclasses
-import os
-import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -340,52 +337,6 @@ class Moments:
             return wide
 
         return self._mapped(widened, row_columns=rows)
-
-
-def write_moments(moments: Moments, path: Path) -> None:
-    """Write the sums over all blocks as NPZ; noise is left out.
-
-    ``squares`` and ``row_columns`` are those of all joints one after the other, ``widths`` the number of each one's
-    columns; ``count``, ``columns`` and ``joints`` are as in :class:`Moments`.
-    """
-    whole = moments.merged_blocks([np.arange(moments.blocks)])
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with partial.open("wb") as stream:
-            np.savez_compressed(
-                stream,
-                squares=np.concatenate([sums.ravel() for sums in whole.squares]),
-                row_columns=np.concatenate(whole.row_columns),
-                widths=np.array([len(own) for own in whole.row_columns]),
-                count=whole.count,
-                columns=np.array(moments.columns),
-                joints=np.array(moments.joints),
-            )
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
-
-
-def read_moments(path: str | Path) -> Moments:
-    """What :func:`write_moments` wrote, as one block.
-
-    Raises:
-        ParameterError: The file is not there, or is something else.
-    """
-    try:
-        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as content:
-            columns, joints = (tuple(str(name) for name in content[key]) for key in ("columns", "joints"))
-            if "gram" in content:  # version 0.1.0 wrote all columns of every joint
-                return Moments.from_dense(content["gram"], content["count"], columns, joints)
-            widths = content["widths"]
-            rows = np.split(content["row_columns"], np.cumsum(widths)[:-1])
-            squares = np.split(content["squares"], np.cumsum((widths + 1) ** 2)[:-1])
-            shaped = (own.reshape(1, w + 1, w + 1) for own, w in zip(squares, widths.tolist(), strict=True))
-            return Moments(tuple(shaped), tuple(rows), content["count"], columns, joints)
-    except FileNotFoundError as error:
-        raise ParameterError(f"{path}: there is no such file; casysid identify writes it beside result.json") from error
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise ParameterError(f"{path}: these are no moments as casysid identify writes them ({error})") from error
 
 
 def _checked_columns(own: npt.ArrayLike, columns: Sequence[str]) -> Indices:

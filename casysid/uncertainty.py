@@ -30,7 +30,7 @@ from casysid.threads import single_threaded
 
 SAMPLES = 40
 """Projected samples: standard errors are known to some 10 % of themselves."""
-CHUNK = 20_000
+CHUNK = 4_000
 """Samples of a motion that are evaluated at once."""
 INERTIA_ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """xx yy zz xy xz yz, the order in which a link's inertia is reported."""

@@ -31,13 +31,12 @@ from typing import Any
 
 import numpy as np
 from noisy_measures import EIV, MEASURES, Row, run
-from noisy_trials import RATE, make_trial, rival_moments
+from noisy_trials import RATE, denoised_problem, make_trial, rival_moments
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
 from casysid.identification import identify
-from casysid.identification.problem import build_problem
 
 LARGE = 500_000
 LARGEST_OVERHEAD, LONGEST = 4.0, 60.0
@@ -53,7 +52,7 @@ def overhead(samples: int) -> Row:
     rival_moments(dataclasses.replace(trial, recording=trial.recording.split(0.1)[0]), cutoff)  # compiles
     runs: dict[str, Callable[[], Any]] = {
         "moments": lambda: rival_moments(trial, cutoff),
-        "with noise": lambda: build_problem(trial.robot, [trial.recording], cutoff, EIV),
+        "with noise": lambda: denoised_problem(trial, cutoff, EIV),
         "all": lambda: identify(trial.robot, trial.recording, EIV),
     }
     for name, timed in runs.items():

@@ -89,7 +89,7 @@ def write_log(folder: Path, robot: Path, rows: int, kind: str) -> Path:
 def measured(command: str, robot: Path, log: Path, folder: Path) -> dict[str, float]:
     """Peak memory [B], processor and wall time [s] of one command."""
     arguments = [sys.executable, "-m", "casysid", command, str(robot), str(log)]
-    arguments += ["-o", str(folder / "result")] if command == "identify" else []
+    arguments += ["--out", str(folder / "result")] if command == "identify" else []
     begin = time.perf_counter()
     process = subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None

@@ -92,14 +92,13 @@ def prepare_trial(data: Path, trial: Trial, settings: Settings) -> Preparation:
 
 def settled(preparation: Preparation, result: IdentificationResult) -> list[str]:
     """What the data decided on one robot, in sentences: friction, delay, prior, noise."""
-    chosen = [one.sentence for one in preparation.friction.chosen] or ["nothing beyond viscous and Coulomb"]
+    chosen = [one.sentence for one in preparation.choices.friction.chosen] or ["nothing beyond viscous and Coulomb"]
     figures = result.estimate.diagnostics
-    lines = [f"friction: {'; '.join(chosen)}", f"delay: {preparation.delay.reason}"]
-    if "effective_parameters" in figures:
-        decided, strength = figures["effective_parameters"], figures["strength"]
-        lines.append(
-            f"prior: strength {strength:.1e}; the data decide {decided:.1f} of {result.estimate.rank} directions"
-        )
+    lines = [f"friction: {'; '.join(chosen)}", f"delay: {preparation.choices.delay.reason}"]
+    decided = {name.removeprefix("decided_"): value for name, value in figures.items() if name.startswith("decided_")}
+    if decided:
+        numbers = ", ".join(f"{name} {value:.1f}" for name, value in decided.items())
+        lines.append(f"prior: the data decide {sum(decided.values()):.1f} parameters ({numbers})")
     if "noise_share_of_weakest_direction" in figures:
         share, removed = figures["noise_share_of_weakest_direction"], figures["directions_too_noisy"]
         lines.append(f"noise: {share:.2g} of the weakest direction's energy; {removed:.0f} directions limited")
@@ -138,7 +137,7 @@ def main() -> None:
                 for one in methods
                 if one.name in OWN_WAY and (its := dataclasses.replace(settings, method=one))
             }
-        results, cutoff = {**comparison.results, **own}, preparation.cutoff.cutoff
+        results, cutoff = {**comparison.results, **own}, preparation.choices.band.cutoff
         errors = {name: result.held_out.relative for name, result in results.items()}
         others = [error for name, error in errors.items() if name != arguments.judged]
         judged = results.get(arguments.judged)

@@ -146,7 +146,7 @@ def settings_of(case: Case) -> dict[str, Settings]:
     common = Settings(cutoff=CUTOFF, friction=case.friction, threads=1)
     return {
         "least squares": replace(common, method=WeightedLeastSquares(), consistency=None),
-        "ridge, projected": common,
+        "empirical Bayes, projected": common,
     }
 
 
@@ -163,7 +163,7 @@ def examine(name: str, dry: bool, seed: int) -> dict[str, dict[str, list[float]]
     recording = record(case, seed)
     file = wrong_file(case.plant.robot, np.random.default_rng([seed, 2]))
     ways = settings_of(case)
-    preparation = prepare(file, recording, ways["ridge, projected"], held_out=[unseen_recording(name, dry)])
+    preparation = prepare(file, recording, ways["empirical Bayes, projected"], held_out=[unseen_recording(name, dry)])
     return {way: covered(solve(preparation, settings), case.plant) for way, settings in ways.items()}
 
 
@@ -189,11 +189,12 @@ def covered(result: IdentificationResult, plant: Plant) -> dict[str, list[float]
 
 
 def band_coverage(result: IdentificationResult) -> list[float]:
-    """Share of the held-out samples within the 95 % band of predicted torque, by joint, in the band of the fit."""
+    """Share of the held-out averages within the 95 % band of predicted torque, by joint."""
     (motion,), unseen = result.held_out_motions, result.held_out
     assert unseen is not None
     error = np.abs(unseen.measured[0] - unseen.predictions[0])
-    return np.asarray(np.mean(error <= torque_band(result, motion), axis=0)).tolist()
+    band = [np.interp(unseen.times[0], motion.time, width) for width in torque_band(result, motion).T]
+    return np.asarray(np.mean(error <= np.column_stack(band), axis=0)).tolist()
 
 
 def summarise(found: list[dict[str, dict[str, list[float]]]]) -> dict[str, dict[str, object]]:

@@ -3,7 +3,7 @@
     python scripts/measure_friction_choice.py [--robot head] [--seeds 5] [--recordings 2] [--share 0.1] [--json FILE]
 
 Every trial gives one joint, a different one for each seed, one kind of friction more than viscous, Coulomb, offset and
-armature. Its torque is a share of the joint's whole; on top comes noise of the torque, part of it slow.
+armature; friction before sliding is part of the usual model and is not counted. Its torque is a share of the joint's whole; on top comes noise of the torque, part of it slow.
 """
 
 from __future__ import annotations
@@ -33,8 +33,10 @@ from casysid.dynamics import (
     build_regressor,
     with_width,
 )
-from casysid.identification import Settings
-from casysid.identification.friction_choice import FrictionChoice, choose_friction
+from casysid.identification import Settings, choose_band
+from casysid.identification.passes import Passes
+from casysid.identification.tuning.candidates import gather_candidates
+from casysid.identification.tuning.friction_selection import FrictionChoice, select_friction
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.simulation import Reference, design_sinusoids
@@ -42,7 +44,7 @@ from casysid.simulation import Reference, design_sinusoids
 KINDS = (
     "plain", "stribeck", "power_viscous", "viscous_asymmetry", "stiffness", "loaded_coulomb", "coupling",
 )  # fmt: skip
-WIDTH, CUTOFF, RATE, DURATION = 0.01, 8.0, 200.0, 30.0
+WIDTH, RATE, DURATION = 0.01, 200.0, 30.0
 SLOW_NOISE, FAST_NOISE, MEMORY = 0.01, 0.02, 0.98
 POSITION_NOISE = 2e-5  # rad
 
@@ -128,14 +130,15 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     robot = Robot.from_file(find_model(options.robot))
-    settings = Settings(cutoff=CUTOFF, choose_friction=True, threads=1)
+    settings = Settings(threads=1)
     figures, table = {}, Table("kind", "found", "others chosen", "of candidates", "CPU [s]", title=robot.name)
     for kind in options.kinds.split(","):
         found, others, asked, seconds = 0, 0, 0, 0.0
         for seed in range(options.seeds):
             recordings, joint = simulate(robot, kind, seed, options.share, options.recordings)
             started = time.process_time()
-            choice = choose_friction(robot, recordings, CUTOFF, settings, 5e-3)
+            passes = Passes(robot, recordings, choose_band(recordings), threads=1)
+            choice = select_friction(gather_candidates(passes, settings), settings)
             seconds += time.process_time() - started
             hit, wrong = judge(choice, kind, joint)
             found, others, asked = found + hit, others + wrong, asked + choice.asked

@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from noisy_trials import RATE, RIVAL_WIDTH, best_rival, consistent_least_squares, make_trial, unordered_trial
+from noisy_trials import RATE, best_rival, consistent_least_squares, denoised_problem, make_trial, unordered_trial
 
 from casysid.accumulation import accumulate_moments
 from casysid.estimation import BayesianDenoising, ErrorsInVariables, WeightedLeastSquares
 from casysid.identification import Settings, identify
-from casysid.identification.problem import build_problem
 from casysid.signals import position_noise
 
 NOISE, HIGHEST = (1e-5, 1e-4, 1e-3), (2.0, 6.0)
@@ -79,7 +78,7 @@ def accuracy(robot: str, seed: int, size: float, noise: float, highest: float) -
         "true motion": trial.error(consistent_least_squares(regressor, exact)),
         "rival's cut-off": cutoff,
         "cut-off": result.cutoff.cutoff,
-        "of equations": result.cutoff.fitted,
+        "motion": result.cutoff.motion_band,
         "further friction": len(result.friction.chosen),
     }
 
@@ -96,12 +95,9 @@ def flatness(robot: str, seed: int, size: float, noise: float, highest: float) -
     trial = make_trial(robot, seed, noise, highest, duration=size)
     found: Row = {"eiv": [], "wls": []}
     for name, method in (("eiv", ErrorsInVariables()), ("wls", WeightedLeastSquares())):
-        settings = Settings(method=method, ends=False)
         for ratio in FLAT_RATIOS:
-            problem = build_problem(
-                trial.robot, [trial.recording], ratio * highest, settings, relative_width=RIVAL_WIDTH
-            )
-            estimate = method.estimate(problem.moments, problem.regressor.prior)
+            regressor, moments = denoised_problem(trial, ratio * highest, EIV)
+            estimate = method.estimate(moments, regressor.prior)
             found[name].append(trial.error(estimate.parameters))
     return found
 
@@ -120,11 +116,11 @@ def unordered(robot: str, seed: int, size: float, share: float) -> Row:
     trial, levels = unordered_trial(robot, seed, 1e-3, share, samples=int(size * RATE))
     methods = {"least squares": WeightedLeastSquares(), "Bayes": BayesianDenoising(), "eiv": ErrorsInVariables()}
     found = {}
-    for told, settings in (("", Settings()), (", given", Settings(input_noise=levels))):
-        problem = build_problem(trial.robot, [trial.recording], None, settings)
+    for told, settings in (("", Settings(threads=1)), (", given", Settings(input_noise=levels, threads=1))):
+        regressor, moments = denoised_problem(trial, None, settings)
         for name, method in methods.items():
             if not told or name == "eiv":  # the others do not use the levels
-                estimate = method.estimate(problem.moments, problem.regressor.prior)
+                estimate = method.estimate(moments, regressor.prior)
                 found[name + told] = trial.error(estimate.parameters) ** 2
     return found
 

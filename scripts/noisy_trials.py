@@ -8,22 +8,25 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
 from casysid.bundled import find_model
-from casysid.dynamics import DEFAULT_FRICTION, Coulomb, Regressor, build_regressor
+from casysid.dynamics import DEFAULT_FRICTION, Coulomb, FrictionKind, Regressor, build_regressor, with_width
 from casysid.estimation import WeightedLeastSquares
-from casysid.identification import IdentificationResult, Settings
-from casysid.identification.problem import MOTION_TO_TORQUE_BAND, coulomb_width, make_motion, sum_moments
+from casysid.identification import IdentificationResult, Settings, choose_band
+from casysid.identification.noise_moments import with_noise
+from casysid.identification.passes import Passes
 from casysid.moments import Moments
 from casysid.projection import build_projection, constrained_least_squares
 from casysid.recording import Recording
 from casysid.robot import Robot
-from casysid.signals import NoiseLevels
+from casysid.signals import BandAverage, NoiseLevels, motion_from_recording
 from casysid.simulation import Mechanics, Reference, design_sinusoids
 from casysid.validation.perturbation import hidden_truth
 
@@ -36,7 +39,11 @@ RIVAL_RATIOS = 1.25 * 1.35 ** np.arange(9)
 HIGHEST_SHARE = 0.45
 """Highest cut-off of the rival's smoothing over the rate."""
 RIVAL_WIDTH = 3e-4
-"""The rival's Coulomb friction changes sign as sharply as the noise of its velocities allows."""
+RIVAL_WIDTH_IN_NOISE = 2.0
+"""The rival's Coulomb friction changes sign within so many standard deviations of its velocities' noise, or within the
+share above of their root mean square where that is more."""
+RIVAL_SMOOTHING = 2.0
+"""Cut-off of the rival's positions over its equations'."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +74,21 @@ class Trial:
         return float(np.linalg.norm(predicted - self.torque) / np.linalg.norm(self.torque - self.torque.mean(axis=0)))
 
     def error_of(self, result: IdentificationResult) -> float:
-        """The same of an identification; friction of the true kinds is judged with the true change of sign."""
-        return self.error(result.parameters, result.regressor if result.friction.chosen else self.regressor)
+        """The same of an identification; its Coulomb friction is judged with the true change of sign, as the rival's."""
+        found = result.regressor
+        regressor = build_regressor(
+            found.robot,
+            friction=as_sharp_as_true(found.friction),
+            couplings=found.couplings,
+            quasi_static=result.choices.clock.quasi_static,
+            torque_gains=result.choices.settings.torque_gains,
+        )
+        return self.error(result.parameters, regressor)
+
+
+def as_sharp_as_true(friction: Sequence[FrictionKind]) -> tuple[FrictionKind, ...]:
+    """The same kinds, Coulomb friction with the true change of sign."""
+    return tuple(Coulomb(TRUE_WIDTH) if isinstance(kind, Coulomb) else kind for kind in friction)
 
 
 def load_robot(name: str) -> Robot:
@@ -90,8 +110,7 @@ def make_trial(
         delay: By how much the torques are logged late [s].
     """
     robot = load_robot(name)
-    friction = tuple(Coulomb(TRUE_WIDTH) if isinstance(column, Coulomb) else column for column in DEFAULT_FRICTION)
-    regressor = build_regressor(robot, friction=friction)
+    regressor = build_regressor(robot, friction=as_sharp_as_true(DEFAULT_FRICTION))
     truth = hidden_truth(robot, Mechanics(), seed)
     time = np.arange(int(duration * RATE)) / RATE
     with warnings.catch_warnings():
@@ -147,15 +166,36 @@ def unordered_trial(
     return dataclasses.replace(trial, recording=recording), levels
 
 
+def denoised_problem(trial: Trial, cutoff: float | None, settings: Settings) -> tuple[Regressor, Moments]:
+    """The usual model and its moments as `identify` takes them, with what noise has added to them.
+
+    Args:
+        trial: Whose recording is summed.
+        cutoff: Of the equations [Hz]; None where samples have no time.
+        settings: What is known of the noise, blocks and threads.
+    """
+    band = choose_band([trial.recording], cutoff)
+    passes = Passes(trial.robot, [trial.recording], band, blocks=settings.blocks, threads=settings.threads)
+    friction = with_width(DEFAULT_FRICTION, tuple(passes.width.tolist()))
+    regressor = build_regressor(trial.robot, friction=friction)
+    moments, _ = with_noise(passes.moments(regressor), regressor, passes, settings.input_noise)
+    return regressor, moments
+
+
 def rival_moments(trial: Trial, cutoff: float) -> tuple[Regressor, Moments]:
     """The recording smoothed at a cut-off [Hz], its ends and stands left out, without knowledge of the noise."""
-    motion = make_motion(trial.robot, trial.recording, cutoff)
-    always = motion.standing.all(axis=0)  # noise hides all motion
-    motion = dataclasses.replace(motion, standing=motion.standing & ~always)
-    width = tuple(coulomb_width([motion], RIVAL_WIDTH).tolist())
-    friction = tuple(Coulomb(width) if isinstance(column, Coulomb) else column for column in DEFAULT_FRICTION)
+    motion = motion_from_recording(trial.robot, trial.recording, RIVAL_SMOOTHING * cutoff)
+    speed = np.sqrt(np.mean(motion.v**2, axis=0))
+    width = np.maximum(RIVAL_WIDTH_IN_NOISE * motion.velocity_noise, RIVAL_WIDTH * speed)
+    motion = motion.without_ends()
+    moving = ~motion.standing | motion.standing.all(axis=0)  # noise that hides all motion is no stand
+    friction = tuple(
+        Coulomb(tuple(width.tolist())) if isinstance(column, Coulomb) else column for column in DEFAULT_FRICTION
+    )
     regressor = build_regressor(trial.robot, friction=friction)
-    return regressor, sum_moments(regressor, [motion], cutoff, Settings(ends=False))
+    state = motion.q, motion.v, motion.a, motion.tau
+    average = BandAverage(motion.time, cutoff)
+    return regressor, accumulate_moments(regressor, *state, average=average, valid=moving, threads=1)
 
 
 def consistent_least_squares(regressor: Regressor, moments: Moments) -> Array:
@@ -169,7 +209,7 @@ def best_rival(trial: Trial, highest: float) -> tuple[float, float]:
     """Smallest error of consistent least squares over the cut-offs, and that cut-off [Hz]."""
     found = []
     for cutoff in highest * RIVAL_RATIOS:
-        if MOTION_TO_TORQUE_BAND * cutoff < HIGHEST_SHARE * RATE:
+        if RIVAL_SMOOTHING * cutoff < HIGHEST_SHARE * RATE:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 found.append((trial.error(consistent_least_squares(*rival_moments(trial, cutoff))), float(cutoff)))

@@ -6,7 +6,7 @@ velocity; the same moments, regressor and weights between joints for all, no pri
 as large as they are, and one joint's is in the columns of every link that it moves: it keeps the columns' relations, so
 that a model with noise of its own in each column cannot see it. Two rows beside the paper's take it out of the moments
 by what the encoders' noise adds to them. Beyond the paper are casysid's own: motion from a spline, equations averaged
-below a cut-off that the data chose, the model file as prior, and equations of joints that friction holds left out.
+in a band derived from the motion, the model file as prior, and equations of joints near rest with a noise of their own.
 """
 
 from __future__ import annotations
@@ -25,17 +25,23 @@ from scipy.signal import lfilter
 
 from casysid.arrays import Array
 from casysid.bundled import find_model
-from casysid.dynamics import DEFAULT_FRICTION, Regressor, Viscous, build_regressor
+from casysid.dynamics import DEFAULT_FRICTION, Regressor, Viscous, build_regressor, with_width
 from casysid.errors import CasysidError, CasysidWarning
-from casysid.estimation import ErrorsInVariables, LassoRegression, Ridge, StepwiseRegression, WeightedLeastSquares
+from casysid.estimation import (
+    EmpiricalBayes,
+    ErrorsInVariables,
+    LassoRegression,
+    Ridge,
+    StepwiseRegression,
+    WeightedLeastSquares,
+)
 from casysid.estimation.base import Estimate, Estimator
 from casysid.estimation.bayesian import BayesianDenoising
-from casysid.identification import Settings, choose_cutoff
-from casysid.identification.coulomb import choose_relative_width
-from casysid.identification.problem import USUAL_WIDTH, LinearProblem, build_problem, sum_moments, with_widths
-from casysid.identification.standstill import choose_moving_only
+from casysid.identification import Settings, choose_band
+from casysid.identification.noise_moments import with_noise
+from casysid.identification.passes import Passes, sum_moments
 from casysid.moments import Moments
-from casysid.projection import build_projection, project
+from casysid.projection import build_projection, possible_parameters, project
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.signals import Motion, motion_from_recording, position_noise
@@ -47,7 +53,10 @@ CUTOFF = (
 )
 SOFT, STIFF = 3.0, 6.0  # [Hz], bandwidth of the feedback where tracking is judged, and in recordings
 PIECES = 8  # recordings, each along sinusoids of its own
-TUNING_PIECES = 2  # are enough to settle a cut-off
+BLOCKS = 4  # of time in each
+WIDTH_IN_NOISE, WIDTH = 2.0, 5e-3
+"""Coulomb friction of the paper's methods turns within so many standard deviations of the velocity's noise, or within
+this share of its root mean square where that is more."""
 EVALUATION = 20.0  # [s] of each trajectory that is tracked
 HAND_TUNED = np.geomspace(1e-8, 1e1, 10)
 
@@ -87,7 +96,7 @@ class Experiment:
     def settings(self) -> Settings:
         """The regressor's drive columns; one thread, for processes run beside each other."""
         friction = (Viscous(),) if self.paper_features else DEFAULT_FRICTION
-        return Settings(friction=friction, threads=1, blocks=4)  # at least so many in each piece
+        return Settings(friction=friction, threads=1, blocks=PIECES * BLOCKS)
 
     def build_plant(self) -> Plant:
         """The machine, its sensors as noisy as asked for."""
@@ -173,6 +182,15 @@ def filter_gain(rate: float) -> float:
     return float(np.linalg.norm(differentiate(impulse, impulse, rate)["velocity"]))
 
 
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A regressor with its moments, and the cut-off of the equations [Hz]; None where there was no average."""
+
+    regressor: Regressor
+    moments: Moments
+    cutoff: float | None
+
+
 @dataclass(frozen=True)
 class Recorded:
     """The recordings of one experiment, read when they are needed."""
@@ -188,22 +206,34 @@ class Recorded:
         return self.experiment.follow(self.plant, model, EVALUATION, 500)
 
     @cached_property
-    def paper(self) -> LinearProblem:
+    def paper(self) -> Problem:
         """What the paper's methods see."""
+        motions: Sequence[Motion]
         if self.experiment.smoothed:
-            problem = build_problem(self.plant.robot, self._positions(), CUTOFF, self.experiment.settings)
-            return dataclasses.replace(problem, motions=())
-        settings, motions = self.experiment.settings, [self._logged(path) for path in self.pieces]
-        regressor = build_regressor(self.plant.robot, friction=with_widths(settings, motions, USUAL_WIDTH))
+            band = choose_band(self._positions(), CUTOFF)
+            passes = Passes(self.plant.robot, self._positions(), band)
+            regressor = self._blunt_regressor(passes.motions)
+            moments = sum_moments(regressor, passes.sparse_motions, CUTOFF, blocks=BLOCKS, threads=1)
+            return Problem(regressor, moments, CUTOFF)
+        motions = [self._logged(path) for path in self.pieces]
+        regressor = self._blunt_regressor(motions)
         parts = []
         for motion in motions:  # one by one: all disturbed motions at once would take much memory
-            here = sum_moments(regressor, [motion], None, settings)
-            grown = [
-                sum_moments(regressor, [self._disturbed(motion, sign)], None, settings).squares for sign in (1.0, -1.0)
-            ]
-            noise = tuple(0.5 * (one + two) - own for one, two, own in zip(*grown, here.squares, strict=True))
+            here, *grown = (
+                sum_moments(regressor, [one], None, blocks=BLOCKS, threads=1)
+                for one in (motion, self._disturbed(motion, 1.0), self._disturbed(motion, -1.0))
+            )
+            squares = zip(*(one.squares for one in grown), here.squares, strict=True)
+            noise = tuple(0.5 * (one + two) - own for one, two, own in squares)
             parts.append(dataclasses.replace(here, noise=noise))
-        return LinearProblem(regressor, (), functools.reduce(operator.add, parts), None)
+        return Problem(regressor, functools.reduce(operator.add, parts), None)
+
+    def _blunt_regressor(self, motions: Sequence[Motion]) -> Regressor:
+        """Coulomb friction no sharper than the noise of velocities."""
+        noise = np.max([motion.velocity_noise for motion in motions], axis=0)
+        speed = np.sqrt(np.mean([np.mean(motion.v**2, axis=0) for motion in motions], axis=0))
+        width = tuple(np.maximum(WIDTH_IN_NOISE * noise, WIDTH * speed).tolist())
+        return build_regressor(self.plant.robot, friction=with_width(self.experiment.settings.friction, width))
 
     def _logged(self, path: Path) -> Motion:
         """The signals as the paper's authors had them."""
@@ -224,15 +254,15 @@ class Recorded:
         return dataclasses.replace(motion, q=q, v=v, a=a)
 
     @cached_property
-    def own(self) -> LinearProblem:
-        """What casysid makes of the recordings; its settings are settled on a few of them."""
-        robot, settings, recordings = self.plant.robot, self.experiment.settings, self._positions()
-        few = recordings[:TUNING_PIECES]
-        cutoff = choose_cutoff(robot, few, settings).cutoff
-        moving_only = choose_moving_only(robot, few, cutoff, settings)
-        width = choose_relative_width(robot, few, cutoff, settings, moving_only)
-        problem = build_problem(robot, recordings, cutoff, settings, relative_width=width, moving_only=moving_only)
-        return dataclasses.replace(problem, motions=())
+    def own(self) -> Problem:
+        """What casysid makes of the recordings, in the band that it derives from them."""
+        settings, recordings = self.experiment.settings, self._positions()
+        band = choose_band(recordings)
+        passes = Passes(self.plant.robot, recordings, band, blocks=settings.blocks, threads=settings.threads)
+        friction = with_width(settings.friction, tuple(passes.width.tolist()))
+        regressor = build_regressor(self.plant.robot, friction=friction)
+        moments, _ = with_noise(passes.moments(regressor), regressor, passes, settings.input_noise)
+        return Problem(regressor, moments, band.cutoff)
 
     def _positions(self) -> list[Recording]:
         robot, recordings = self.plant.robot, []
@@ -313,11 +343,12 @@ def hand_tuned_ridge(recorded: Recorded) -> Fitted:
 
 
 def of_casysid(estimator: Estimator) -> Method:
-    """An estimator with the file's prior on casysid's own equations; then the projection."""
+    """An estimator with the file's prior and possible parameters on casysid's own equations; then the projection."""
 
     def fit(recorded: Recorded) -> Fitted:
-        problem = recorded.own
-        estimate = estimator.estimate(problem.moments, problem.regressor.prior)
+        problem, prior = recorded.own, recorded.own.regressor.prior
+        possible = possible_parameters(build_projection(problem.regressor.parameters), prior)
+        estimate = estimator.estimate_among(problem.moments, prior, possible)
         return project_estimate(problem.regressor, problem.moments, estimate), f"cut-off {problem.cutoff:.3g} Hz"
 
     return fit
@@ -343,6 +374,7 @@ METHODS: dict[str, Method] = {
     "Bayesian de-noising, encoder noise": of_paper(ErrorsInVariables(BayesianDenoising(vector="noisy"))),
     "errors in variables": of_paper(ErrorsInVariables()),
     "weighted least squares, own filter": of_casysid(WeightedLeastSquares()),
+    "empirical Bayes, own filter": of_casysid(EmpiricalBayes()),
     "errors in variables, own filter": of_casysid(ErrorsInVariables()),
     "model file": file_parameters,
     "true parameters": true_parameters,

@@ -131,6 +131,7 @@ def compare(table: Table) -> dict[str, float]:
     limit = table["true parameters"]
     for measure in MEASURES:
         found[f"best_over_true_{measure}"] = _best(table, measure) / limit[measure]
+        found[f"default_over_true_{measure}"] = table["empirical Bayes, own filter"][measure] / limit[measure]
         found[f"eiv_over_true_{measure}"] = table["errors in variables, own filter"][measure] / limit[measure]
     return found
 

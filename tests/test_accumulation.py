@@ -1,12 +1,14 @@
 """The one pass against its slow and obvious form."""
 
+import shutil
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from casysid.accumulation import accumulate_moments
-from casysid.dynamics import Coupling, build_regressor, bulk, replay
+from casysid.dynamics import Coupling, build_regressor, bulk, template
 from casysid.errors import ParameterError
 from casysid.moments import Moments
 from casysid.robot import JointKind
@@ -56,7 +58,7 @@ def test_the_sums_do_not_depend_on_threads_or_chunks(monkeypatch):
     samples = log(ROBOT, 20_000, np.random.default_rng(2))
     once = accumulate_moments(REGRESSOR, *samples, blocks=3, threads=1)
     np.testing.assert_array_equal(accumulate_moments(REGRESSOR, *samples, blocks=3, threads=3).gram, once.gram)
-    monkeypatch.setattr(replay, "SAMPLES", 700)
+    monkeypatch.setattr(bulk, "SAMPLES", 700)
     assert_same(accumulate_moments(REGRESSOR, *samples, blocks=3), once)
 
 
@@ -64,24 +66,29 @@ def test_averages_do_not_depend_on_threads_or_chunks(monkeypatch):
     samples, average = log(ROBOT, 5000, np.random.default_rng(12)), BandAverage(np.arange(5000) * 0.01, 1.0)
     valid = np.random.default_rng(13).random((5000, 3)) > 1e-3
     once, own = (accumulate_moments(REGRESSOR, *samples, average=average, valid=x, blocks=3) for x in (None, valid))
-    monkeypatch.setattr(replay, "SAMPLES", 130)
+    monkeypatch.setattr(bulk, "SAMPLES", 130)
     for mask, wanted in ((None, once), (valid, own)):
         got = accumulate_moments(REGRESSOR, *samples, average=average, valid=mask, blocks=3, threads=3)
         assert_same(got, wanted)
     assert (own.count < once.count).any()
 
 
-def test_both_routes_give_the_same_sums(tmp_path, monkeypatch):
+@pytest.mark.skipif(shutil.which("gcc") is None and shutil.which("cc") is None, reason="needs a compiler")
+@pytest.mark.parametrize("average", [None, BandAverage(np.arange(3000) * 0.01, 1.0)], ids=["samples", "averages"])
+def test_both_routes_give_the_same_sums_to_the_bit(average, tmp_path, monkeypatch):
     samples = log(ROBOT, 3000, np.random.default_rng(3))
-    replayed = accumulate_moments(build_regressor(ROBOT), *samples)
+    template._kept.cache_clear()
+    replayed = accumulate_moments(build_regressor(ROBOT), *samples, average=average, blocks=2)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(bulk, "FIND_FROM", 0)
     monkeypatch.setattr(bulk, "COMPILE_FROM", 0)
-    regressor = build_regressor(ROBOT)
-    both = accumulate_moments(regressor, *samples)
-    if regressor.equations.route == "replay":
-        pytest.skip("no compiler here")
-    assert_same(both, replayed)
+    for kernel in ("compiled", "found"):
+        template._kept.cache_clear()
+        regressor = build_regressor(ROBOT)
+        both = accumulate_moments(regressor, *samples, average=average, blocks=2)
+        assert regressor.equations.route == "compiled", kernel
+        assert both.gram.tobytes() == replayed.gram.tobytes(), kernel
+    template._kept.cache_clear()
 
 
 def test_parts_of_a_log_add_up_to_the_whole():

@@ -1,19 +1,23 @@
 """The house stands: imports go one way, heavy packages stay in their rooms, files keep to one purpose."""
 
 import ast
+import importlib
+import inspect
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 PACKAGE = Path(__file__).parents[1] / "casysid"
 ORDER = (
-    ("errors", "arrays", "threads"),
+    ("errors", "arrays", "archives", "memory", "threads"),
+    ("outputs",),
     ("nlp", "inertia"),
     ("robot", "bundled"),
     ("recording", "readers", "dynamics"),
-    ("signals", "moments", "accumulation"),
+    ("signals", "moments", "moments_file", "accumulation"),
     ("identifiability",),
     ("estimation", "projection", "excitation"),
     ("uncertainty",),
@@ -54,6 +58,24 @@ def test_imports_go_one_way(path):
             assert LEVEL[parts[1]] <= own, f"{path.name} imports {module}, which comes after it"
 
 
+@pytest.mark.parametrize("rooms", [("recording", "readers")])
+def test_no_file_imports_itself_through_others(rooms):
+    files = {".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): path for path in FILES}
+    inside = {name: path for name, path in files.items() if room_of(path) in rooms}
+    graph = {name: (imported_modules(path) - typed_only(path)) & inside.keys() for name, path in inside.items()}
+    TopologicalSorter(graph).prepare()  # raises CycleError, which names the files
+
+
+def typed_only(path: Path) -> set[str]:
+    """Modules that are imported for type checkers only."""
+    guards = [
+        node
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+    ]
+    return {node.module for guard in guards for node in guard.body if isinstance(node, ast.ImportFrom) and node.module}
+
+
 @pytest.mark.parametrize(
     ("package", "rooms"),
     [
@@ -81,6 +103,26 @@ def test_every_public_name_exists_and_is_documented():
     assert casysid.__all__ == sorted(casysid.__all__)
     for name in casysid.__all__:
         assert getattr(casysid, name).__doc__, name
+
+
+def public_functions():
+    """By name: of the package and of every room; rooms' inner modules pass paths among themselves."""
+    modules = [importlib.import_module("casysid"), *(importlib.import_module(f"casysid.{room}") for room in LEVEL)]
+    found = {}
+    for module in modules:
+        names = getattr(module, "__all__", [name for name in vars(module) if not name.startswith("_")])
+        found.update({name: getattr(module, name) for name in names})
+    return {
+        name: f for name, f in sorted(found.items()) if inspect.isfunction(f) and f.__module__.startswith("casysid")
+    }
+
+
+@pytest.mark.parametrize("name", public_functions())
+def test_paths_may_be_strings(name):
+    for argument, parameter in inspect.signature(public_functions()[name]).parameters.items():
+        kind = str(parameter.annotation)
+        if not kind.startswith("Callable"):  # what casysid calls is given paths
+            assert "Path" not in kind or "str" in kind, f"{argument}: {kind}"
 
 
 def test_importing_the_command_line_loads_nothing_heavy():

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from casysid.errors import ParameterError
-from casysid.moments import Moments, read_moments, write_moments
+from casysid.moments import Moments
+from casysid.moments_file import read_moments, write_moments
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -199,3 +200,29 @@ def test_what_is_no_moments_file_is_refused(tmp_path, content):
     path.write_bytes(content)
     with pytest.raises(ParameterError, match=r"moments\.npz: these are no moments"):
         read_moments(path)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"gram": np.full((1, 1, 3, 3), 1j)}, "holds complex128"),
+        ({"gram": -np.ones((1, 1, 3, 3))}, "no sums of squares"),
+        ({"gram": np.triu(np.ones((1, 1, 3, 3)))}, "no sums of squares"),
+        ({"gram": np.full((1, 1, 3, 3), np.nan)}, "must be finite"),
+        ({"count": np.full((1, 1), -1.0)}, "a count is negative"),
+        ({"columns": np.array(["a", "a"])}, "a column is there twice"),
+        ({"columns": np.array([object()], dtype=object)}, "these are no moments"),
+    ],
+)
+def test_what_are_no_sums_is_not_read(changed, message, tmp_path):
+    content = {
+        "gram": np.ones((1, 1, 3, 3)),
+        "count": np.ones((1, 1)),
+        "columns": np.array(["a", "b"]),
+        "joints": np.array(["j"]),
+    }
+    np.savez(tmp_path / "good.npz", **content)
+    assert read_moments(tmp_path / "good.npz").columns == ("a", "b")
+    np.savez(tmp_path / "bad.npz", **content | changed)
+    with pytest.raises(ParameterError, match=message):
+        read_moments(tmp_path / "bad.npz")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
 import typer
 
+from casysid.cli.bug_report import INTERNAL_FAULT, describe_fault
 from casysid.cli.compare import compare
 from casysid.cli.excite import excite
 from casysid.cli.identify import identify
@@ -22,7 +24,9 @@ app = typer.Typer(
         "Identify robot dynamics: from a URDF or MJCF and a log of joint positions and torques to a model "
         "a controller can trust."
     ),
-    epilog="Exit codes: 0 done, 1 a solver failed but the result was written, 2 bad input.",
+    epilog="Exit codes: 0 done, 1 a solver failed but the result was written, 2 bad input or no place to write to, "
+    "70 a fault of casysid, 130 interrupted.",
+    pretty_exceptions_enable=False,
 )
 
 
@@ -59,5 +63,12 @@ app.command(epilog="Examples: casysid info arm.urdf  ·  casysid info arm.urdf e
 
 
 def main() -> None:
-    """Run the command line."""
-    app()
+    """Run the command line.
+
+    A fault outside of the verbs, which see to their own, ends in one message and exit code 70 as well.
+    """
+    try:
+        app()
+    except Exception as error:
+        print(f"internal error: {describe_fault(error)}", file=sys.stderr)
+        sys.exit(INTERNAL_FAULT)

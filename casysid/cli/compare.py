@@ -53,17 +53,20 @@ def compare(
     out: Annotated[Path | None, typer.Option(help="Write the figures to this JSON file.")] = None,
 ) -> None:
     """Compare every estimator on the same recordings of ROBOT."""
-    from casysid.cli.console import progress_bar, speaking
+    from casysid.cli.console import progress_bar, speaking, tell_path
 
     with speaking() as console:
         from rich.console import Console
 
-        from casysid.cli.console import rich_table
+        from casysid.cli.console import rich_table, say
         from casysid.estimation import ESTIMATORS, estimator_by_name
         from casysid.identification import compare as run
         from casysid.identification import prepare
         from casysid.identification.output import write_json
+        from casysid.outputs import check_output_file
 
+        if out is not None:
+            check_output_file(out)
         names = [kind.name for kind in ESTIMATORS] if methods == "all" else methods.split(",")
         estimators = [estimator_by_name(name) for name in names]
         settings = make_settings(
@@ -77,12 +80,13 @@ def compare(
             comparison = run(preparation, estimators, settings, progress=progress)
         table = comparison_table(comparison)
         Console().print(rich_table("Torque error, best first", table.header, table.rows))
-        console.print(f"torque delay: {preparation.choices.delay.reason}", markup=False, soft_wrap=True)
+        say(console, f"torque delay: {preparation.choices.delay.reason}")
         for name, reason in comparison.failures.items():
-            console.print(f"{name} failed: {reason}", markup=False, soft_wrap=True)
+            say(console, f"{name} failed: {reason}")
         if out is not None:
             write_json(comparison.to_json(), out)
-            typer.echo(str(out))
+            console.wrote(out)
+            tell_path(out)
 
 
 def comparison_table(comparison: Comparison) -> Table:

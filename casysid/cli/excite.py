@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from casysid.cli.options import GravityOption, LockOption, RobotArgument, load_robot
+from casysid.cli.ranges import check_options, check_samples, numbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
         KeepInBlock,
     )
     from casysid.excitation.results import Progress
+    from casysid.outputs import Stage
     from casysid.robot import Robot
 
 
@@ -88,12 +90,18 @@ def excite(
     ] = Path("excitation"),
 ) -> None:
     """Design the motion of ROBOT that tells most about its parameters, within all limits."""
-    from casysid.cli.console import SOLVER_FAILED, progress_bar, speaking
+    from casysid.cli.console import SOLVER_FAILED, progress_bar, say, speaking, tell_path
 
     with speaking() as console:
-        from casysid.excitation import DesignStatus, build_excitation, describe, design_set, limits_of, write_excitation
-        from casysid.report.excitation_pictures import write_excitation_pictures
+        from casysid.excitation import DesignStatus, build_excitation, describe, design_set, limits_of
+        from casysid.excitation.output import add_excitation, identity_of
+        from casysid.outputs import check_run_folder
+        from casysid.report.excitation_pictures import add_excitation_pictures
 
+        check_options(period=period, harmonics=harmonics, periods=periods, count=count, rate=rate, starts=starts)
+        check_options(acceleration=acceleration, jerk=jerk, clearance=clearance, floor=floor, seed=seed)
+        check_options(velocity_share=velocity_share, torque_share=torque_share)
+        check_run_folder(out, ["excitation.csv", "excitation.json", "joint_trajectory.yaml", "excitation.txt"])
         model = load_robot(robot, gravity, lock, floating_base=False)
         limits = limits_of(
             model,
@@ -102,31 +110,37 @@ def excite(
             acceleration=float("inf") if acceleration is None else acceleration,
             jerk=float("inf") if jerk is None else jerk,
         )
+        series = _series(limits, rate, period, harmonics)
+        check_samples(periods * series.period, rate)
         problem = build_excitation(
             model,
-            series=_series(limits, rate, period, harmonics),
+            series=series,
             periods=periods,
             rate=rate,
             limits=limits,
             clearance=clearance,
             obstacles=_obstacles(floor, wall or [], box or []),
             keep_in=_keep_in(model, keep_in or []),
-            start=None if start is None else _numbers("--start", start, model.nv),
+            start=None if start is None else numbers("--start", start, model.nv),
         )
         problem = _informed(model, problem, criterion, log or [])
         with progress_bar(console) as progress:
             designs = design_set(problem, count, starts=starts, seed=seed, progress=_watch(progress))
-            for design, folder in zip(designs, _folders(out, len(designs)), strict=True):
-                progress("write", 0.0)
-                write_excitation(design, folder)
-                write_excitation_pictures(design, folder)
-            undrawn = _preview(designs, _folders(out, len(designs)))
-        for design, folder in zip(designs, _folders(out, len(designs)), strict=True):
+            if any(design.status is DesignStatus.INTERRUPTED for design in designs):
+                raise KeyboardInterrupt
+            progress("write", 0.0)
+            with console.run_folder(out, identity_of(designs[0])) as stage:
+                stages = _stages(stage, len(designs))
+                for design, own in zip(designs, stages, strict=True):
+                    add_excitation(design, own)
+                    add_excitation_pictures(design, own)
+                undrawn = _preview(designs, stages)
+        for design, own in zip(designs, stages, strict=True):
             for line in describe(design):
-                console.print(f"  · {line}", markup=False, soft_wrap=True)
-            typer.echo(str(folder / "excitation.csv"))
+                say(console, f"  · {line}")
+            tell_path(own.home / "excitation.csv")
         if undrawn:
-            console.print(f"  · {undrawn}", markup=False, soft_wrap=True)
+            say(console, f"  · {undrawn}")
     if any(design.status is not DesignStatus.CONVERGED for design in designs):
         sys.exit(SOLVER_FAILED)
 
@@ -149,10 +163,10 @@ def _obstacles(floor: float | None, walls: list[str], boxes: list[str]) -> list[
     if floor is not None:
         found.append(HalfSpace("floor", np.array([0.0, 0.0, 1.0]), floor))
     for k, text in enumerate(walls, 1):
-        *normal, offset = _numbers("--wall", text, 4)
+        *normal, offset = numbers("--wall", text, 4)
         found.append(HalfSpace(f"wall {k}", np.array(normal), offset))
     for k, text in enumerate(boxes, 1):
-        corners = np.array(_numbers("--box", text, 6)).reshape(2, 3)
+        corners = np.array(numbers("--box", text, 6)).reshape(2, 3)
         found.append(Box(f"box {k}", corners.min(axis=0), corners.max(axis=0)))
     return found
 
@@ -162,22 +176,10 @@ def _keep_in(robot: Robot, texts: list[str]) -> list[KeepInBlock]:
 
     found = []
     for text in texts:
-        link, _, numbers = text.rpartition("=")
-        corners = _numbers("--keep-in", numbers, 6)
+        link, _, words = text.rpartition("=")
+        corners = numbers("--keep-in", words, 6)
         found.append(keep_in(robot, link, corners[:3], corners[3:]))
     return found
-
-
-def _numbers(option: str, text: str, count: int) -> list[float]:
-    from casysid.errors import ParameterError
-
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) != count:
-        raise ParameterError(f"{option} wants {count} numbers with commas between them; got {text!r}")
-    return values
 
 
 def _informed(robot: Robot, problem: ExcitationProblem, choice: CriterionChoice, logs: list[Path]) -> ExcitationProblem:
@@ -198,14 +200,14 @@ def _informed(robot: Robot, problem: ExcitationProblem, choice: CriterionChoice,
     return after_recordings(problem, read_recordings(recordings, robot)) if recordings else problem
 
 
-def _preview(designs: tuple[ExcitationDesign, ...], folders: list[Path]) -> str:
+def _preview(designs: tuple[ExcitationDesign, ...], stages: list[Stage]) -> str:
     """Draw the robot on its motions; what is in the way of that, if anything."""
     from casysid.errors import MissingExtraError
-    from casysid.report.excitation_preview import write_excitation_preview
+    from casysid.report.excitation_preview import add_excitation_preview
 
     try:
-        for design, folder in zip(designs, folders, strict=True):
-            write_excitation_preview(design, folder)
+        for design, stage in zip(designs, stages, strict=True):
+            add_excitation_preview(design, stage)
     except MissingExtraError as error:
         return f"No preview.png: {error}."
     return ""
@@ -220,5 +222,5 @@ def _watch(progress: Callable[[str, float], None]) -> Progress:
     return tell
 
 
-def _folders(out: Path, count: int) -> list[Path]:
-    return [out] if count == 1 else [out / f"trajectory_{k + 1}" for k in range(count)]
+def _stages(stage: Stage, count: int) -> list[Stage]:
+    return [stage] if count == 1 else [stage.within(f"trajectory_{k + 1}") for k in range(count)]

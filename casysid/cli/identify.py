@@ -40,6 +40,11 @@ if TYPE_CHECKING:
     from casysid.identification import IdentificationResult
 
 
+FILES = ("result.json", "identified.urdf", "identified.xml", "moments.npz", "report.html")
+SMALLEST_RUN = 2**15
+"""Less than any run takes: that of two joints, without a choice of the low-pass, takes 108 kB [bytes]."""
+
+
 def identify(
     robot: RobotArgument,
     logs: LogsArgument,
@@ -67,14 +72,16 @@ def identify(
     ),
 ) -> None:
     """Identify the inertial and friction parameters of ROBOT from recordings."""
-    from casysid.cli.console import SOLVER_FAILED, progress_bar, speaking
+    from casysid.cli.console import SOLVER_FAILED, progress_bar, speaking, tell_path
 
     with speaking() as console:
         from casysid.estimation import Status
         from casysid.identification import identify as run
-        from casysid.identification.output import write_result
-        from casysid.report import write_report
+        from casysid.identification.output import add_result, identity_of
+        from casysid.outputs import check_run_folder
+        from casysid.report import add_report
 
+        check_run_folder(out, FILES, SMALLEST_RUN)
         noise = noise_levels(noise_position, noise_velocity, noise_acceleration)
         settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise, friction, flip)
         model = load_robot(robot, gravity, lock, floating_base)
@@ -82,16 +89,17 @@ def identify(
         with progress_bar(console) as progress:
             result = run(model, fitted, settings, held_out=unseen, progress=progress)
             progress("write", 0.0)
-            notes = write_result(result, out, export_inconsistent=export_inconsistent)
-            write_report(result, out / "report.html")
+            with console.run_folder(out, identity_of(result), claims=FILES) as stage:
+                notes = add_result(result, stage, export_inconsistent=export_inconsistent)
+                add_report(result, stage)
         _print(console, result, notes)
-        typer.echo(str(out / "result.json"))
+        tell_path(out / "result.json")
     if result.status is not Status.CONVERGED:
         sys.exit(SOLVER_FAILED)
 
 
 def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> None:
-    from casysid.cli.console import rich_table
+    from casysid.cli.console import rich_table, say
     from casysid.identification.verdict import judge
     from casysid.report import drive_table, error_table, link_table, noise_table
 
@@ -102,12 +110,12 @@ def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...
     ):
         console.print(rich_table(title, table.header, table.rows))
         console.print()
-    console.print(f"torque delay: {result.delay.reason}", markup=False, soft_wrap=True)
+    say(console, f"torque delay: {result.delay.reason}")
     if noise := noise_table(result):
         console.print(rich_table("Noise of the measured motion", noise.header, noise.rows))
         console.print()
     verdict = judge(result)
-    console.print(f"[bold {'green' if verdict.accepted else 'red'}]{verdict.headline}[/]")
+    say(console, verdict.headline, style="bold green" if verdict.accepted else "bold red")
     friction = [one.sentence for one in result.friction.chosen]
     for line in (*verdict.reasons, *verdict.remarks, *friction, *notes):
-        console.print(f"  · {line}", markup=False, soft_wrap=True)
+        say(console, f"  · {line}")

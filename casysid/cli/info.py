@@ -22,14 +22,16 @@ def info(
 
     with speaking():
         from rich.console import Console
+        from rich.text import Text
 
-        from casysid.cli.console import rich_table
+        from casysid.cli.console import printable, rich_table
         from casysid.recording import open_recording
         from casysid.report.overview import recording_tables, robot_tables
 
         model = load_robot(robot, gravity, lock, floating_base)
         console = Console()
-        console.print(f"[bold]{model.name}[/]  {model.source}", highlight=False)
+        name, source = printable(model.name), printable(str(model.source))
+        console.print(Text.assemble((name, "bold"), f"  {source}"), highlight=False)
         tables = robot_tables(model)
         if log is not None:
             tables += recording_tables(model, open_recording(log, model))

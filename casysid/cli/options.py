@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from casysid.cli.ranges import check_options, checked, numbers
+
 if TYPE_CHECKING:
     from casysid.identification import Settings
-    from casysid.recording import Recording
+    from casysid.recording import Source
     from casysid.robot import Robot
     from casysid.signals import NoiseLevels
 
@@ -102,19 +104,23 @@ def load_robot(
     from casysid.bundled import find_model
     from casysid.robot import Robot
 
+    for value in gravity or ():
+        checked("--gravity", value)
     return Robot.from_file(find_model(name), gravity=gravity, floating_base=floating_base, locked=_locked(lock or []))
 
 
 def load_recordings(
     robot: Robot, logs: list[Path], held_out: list[Path] | None, split: float | None
-) -> tuple[list[Recording], list[Recording]]:
+) -> tuple[list[Source], list[Source]]:
     """The fitted and the held-out recordings."""
-    from casysid.errors import ParameterError
-    from casysid.recording import read_recordings
+    from casysid.identification.passes import is_long
+    from casysid.recording import Source, open_recordings
 
-    if split is not None and not 0.0 < split < 1.0:
-        raise ParameterError(f"--split wants a share of time between 0 and 1, such as 0.6; got {split}")
-    fitted, unseen = list(read_recordings(logs, robot)), list(read_recordings(held_out or [], robot))
+    check_options(split=split)
+    fitted, unseen = list[Source](), list[Source]()
+    for files, several in ((logs, fitted), (held_out or [], unseen)):
+        opened = open_recordings(files, robot)
+        several += opened if is_long(opened) else [one.in_memory() for one in opened]
     if split is None:
         return fitted, unseen
     halves = [recording.split(split) for recording in fitted]
@@ -126,23 +132,16 @@ def noise_levels(position: str | None, velocity: str | None, acceleration: str |
     from casysid.signals import NoiseLevels
 
     return NoiseLevels(
-        position=_numbers("--noise-position", position),
-        velocity=_numbers("--noise-velocity", velocity),
-        acceleration=_numbers("--noise-acceleration", acceleration),
+        position=_noise("--noise-position", position),
+        velocity=_noise("--noise-velocity", velocity),
+        acceleration=_noise("--noise-acceleration", acceleration),
     )
 
 
-def _numbers(option: str, text: str | None) -> float | tuple[float, ...] | None:
-    from casysid.errors import ParameterError
-
+def _noise(option: str, text: str | None) -> float | tuple[float, ...] | None:
     if text is None:
         return None
-    try:
-        values = tuple(float(word) for word in text.split(","))
-    except ValueError as error:
-        raise ParameterError(
-            f"{option} wants a number, or one for each separated by commas, such as 1e-4,2e-4; got {text!r}"
-        ) from error
+    values = numbers(option, text)
     return values[0] if len(values) == 1 else values
 
 
@@ -164,6 +163,7 @@ def make_settings(
     from casysid.inertia import Consistency
     from casysid.signals import NoiseLevels
 
+    check_options(cutoff=cutoff, time_scale=time_scale)
     pairs = [tuple(text.split("+")) for text in couplings or []]
     return Settings(
         method=estimator_by_name(method),
@@ -182,9 +182,10 @@ def _seconds(delay: str) -> float | None:
     from casysid.errors import ParameterError
 
     try:
-        return None if delay == "auto" else float(delay)
+        seconds = None if delay == "auto" else float(delay)
     except ValueError as error:
         raise ParameterError(f"--delay wants auto or a number of seconds, such as 0.005; got {delay!r}") from error
+    return None if seconds is None else checked("--delay", seconds)
 
 
 def _locked(pairs: list[str]) -> dict[str, float]:
@@ -194,9 +195,10 @@ def _locked(pairs: list[str]) -> dict[str, float]:
     for pair in pairs:
         joint, _, value = pair.partition("=")
         try:
-            locked[joint] = float(value)
+            position = float(value)
         except ValueError as error:
             raise ParameterError(
                 f"--lock wants JOINT=VALUE with a number, such as gripper=0.02; got {pair!r}"
             ) from error
+        locked[joint] = checked("--lock", position)
     return locked

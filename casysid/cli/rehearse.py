@@ -9,7 +9,9 @@ from typing import Annotated
 
 import typer
 
+from casysid.cli.identify import FILES, SMALLEST_RUN
 from casysid.cli.options import FloatingOption, GravityOption, LockOption, RobotArgument, load_robot
+from casysid.cli.ranges import check_options, check_samples
 
 
 class ExcitationChoice(enum.StrEnum):
@@ -37,17 +39,23 @@ def rehearse(
     ),
 ) -> None:
     """Rehearse the identification of ROBOT on a simulated machine that differs from its file."""
-    from casysid.cli.console import SOLVER_FAILED, progress_bar, rich_table, speaking
+    from casysid.cli.console import SOLVER_FAILED, progress_bar, rich_table, say, speaking, tell_path
 
     with speaking() as console:
         from casysid.estimation import Status, estimator_by_name
         from casysid.identification import Settings
-        from casysid.report import write_report
-        from casysid.report.rehearsal_pictures import write_rehearsal_pictures
+        from casysid.identification.output import identity_of
+        from casysid.outputs import check_run_folder
+        from casysid.report import add_report
+        from casysid.report.rehearsal_pictures import add_rehearsal_pictures
         from casysid.report.validation_tables import rehearsal_tables
-        from casysid.validation import Excitation, RehearsalSettings, write_rehearsal
+        from casysid.validation import Excitation, RehearsalSettings
         from casysid.validation import rehearse as run
+        from casysid.validation.output import add_rehearsal
 
+        check_options(of="rehearse", seed=seed, duration=duration, rate=rate)
+        check_samples(duration, rate)
+        check_run_folder(out, (*FILES, "rehearsal.json"), SMALLEST_RUN)
         identification = Settings(method=estimator_by_name(method)) if method else Settings()
         settings = RehearsalSettings(
             duration=duration,
@@ -60,14 +68,15 @@ def rehearse(
         with progress_bar(console) as progress:
             rehearsal = run(model, settings, progress)
             progress("write", 0.0)
-            notes = write_rehearsal(rehearsal, out)
-            write_report(rehearsal.result, out / "report.html")
-            pictures = write_rehearsal_pictures(rehearsal, out)
+            with console.run_folder(out, identity_of(rehearsal.result), claims=FILES) as stage:
+                notes = add_rehearsal(rehearsal, stage)
+                add_report(rehearsal.result, stage)
+                pictures = add_rehearsal_pictures(rehearsal, stage)
         for title, table in rehearsal_tables(rehearsal):
             console.print(rich_table(title, table.header, table.rows))
             console.print()
         for line in (*notes, *(f"picture: {path}" for path in pictures)):
-            console.print(f"  · {line}", markup=False, soft_wrap=True)
-        typer.echo(str(out / "rehearsal.json"))
+            say(console, f"  · {line}")
+        tell_path(out / "rehearsal.json")
     if rehearsal.result.status is not Status.CONVERGED:
         sys.exit(SOLVER_FAILED)

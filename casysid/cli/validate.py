@@ -17,6 +17,7 @@ from casysid.cli.options import (
     RobotArgument,
     load_robot,
 )
+from casysid.cli.ranges import check_options
 
 
 def validate(
@@ -40,15 +41,18 @@ def validate(
     out: Annotated[Path, typer.Option(help="Folder for validation.json.")] = Path("validated"),
 ) -> None:
     """Predict the torque of recordings by ROBOT's own parameters; nothing is fitted."""
-    from casysid.cli.console import progress_bar, rich_table, speaking
+    from casysid.cli.console import progress_bar, rich_table, speaking, tell_path
 
     with speaking() as console:
         from casysid.identification.output import write_json
+        from casysid.outputs import check_run_folder
         from casysid.recording import read_recordings
         from casysid.report.validation_tables import validation_tables
         from casysid.validation import EarlierResult, read_earlier_result
         from casysid.validation import validate as run
 
+        check_options(cutoff=cutoff)
+        check_run_folder(out, ["validation.json"])
         model = load_robot(robot, gravity, lock, floating_base)
         recordings = read_recordings(logs, model)
         earlier = read_earlier_result(result) if result else EarlierResult()
@@ -56,9 +60,9 @@ def validate(
             earlier = dataclasses.replace(earlier, flip=tuple(flip))
         with progress_bar(console) as progress:
             validation = run(model, recordings, earlier=earlier, cutoff=cutoff, progress=progress)
-        out.mkdir(parents=True, exist_ok=True)
-        write_json(validation.to_json(), out / "validation.json")
+        with console.run_folder(out, joining=True) as stage:
+            write_json(validation.to_json(), stage.folder / "validation.json")
         for title, table in validation_tables(validation):
             console.print(rich_table(title, table.header, table.rows))
             console.print()
-        typer.echo(str(out / "validation.json"))
+        tell_path(out / "validation.json")

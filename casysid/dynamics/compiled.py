@@ -1,7 +1,7 @@
 """Straight-line code as C on vectors of samples, compiled once for this machine and kept in the user's cache directory.
 
-Any failure (no compiler, no place to write, an unknown flag) yields no kernel, never an error: the caller has another
-way.
+Products and sums are not contracted, so that a kernel gives the bits that the replay gives. Any failure (no compiler,
+no place to write, an unknown flag) yields no kernel, never an error: the caller has another way.
 """
 
 from __future__ import annotations
@@ -13,20 +13,24 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
-from casysid.dynamics.instructions import Operation, count_inputs, interpret
+from casysid.dynamics.instructions import OPERATIONS, Operation, count_inputs, interpret
+from casysid.dynamics.kernel_cache import find_library, keep_library, load_library
 
-SAMPLES = 1024  # fewer make the sums slow, more leave the processor's cache
 LONGEST = 60_000  # operations; more would keep a compiler busy for minutes
 Kernel = Callable[[int, int, int], None]
 _MOST_LANES = 8
-_KEPT = 64  # kernels in the cache directory
-_FLAGS = ("-O1", "-march=native", "-fPIC", "-shared", "-w")
+_FLAGS = (
+    *("-O1", "-march=native", "-fPIC", "-shared", "-w"),
+    "-ffp-contract=off",  # no sum of a product is rounded once where NumPy rounds twice
+    *sorted({f"-fno-builtin-{one.c.partition('(')[0]}" for one in OPERATIONS.values() if one.from_library}),
+)
 _SECONDS = 120.0
 _FAILURES = (OSError, RuntimeError, AttributeError, subprocess.SubprocessError)
 
@@ -83,8 +87,8 @@ class Compiled:
 def find_kernel(function: Any) -> Kernel | None:
     """The kernel of an SX function with one output if it was compiled before, by this compiler for this machine."""
     try:
-        library = _library(write_source(function))
-        return _load(library) if library.exists() else None
+        library = find_library(_key(write_source(function)))
+        return None if library is None else _kernel(library)
     except _FAILURES:
         return None
 
@@ -92,11 +96,14 @@ def find_kernel(function: Any) -> Kernel | None:
 def compile_kernel(function: Any) -> Kernel | None:
     """The kernel of an SX function with one output; None when it cannot be compiled here."""
     try:
-        library = _library(source := write_source(function))
-        _build(source, library)
-        return _load(library)
+        source = write_source(function)
+        library = _build(source)
+        kernel = _kernel(library)
     except _FAILURES:
         return None
+    with suppress(*_FAILURES):  # a place to keep it is not needed
+        keep_library(_key(source), library)
+    return kernel
 
 
 def write_source(function: Any) -> str:
@@ -141,31 +148,23 @@ class _Writer:
         return name
 
 
-def _build(source: str, library: Path) -> None:
-    """Compile beside the library's place and move it there whole, so that many processes may try at once."""
-    library.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=library.parent, prefix="build-") as directory:
-        text, built = Path(directory) / "kernel.c", Path(directory) / library.name
+def _build(source: str) -> bytes:
+    """The shared library of a source."""
+    with tempfile.TemporaryDirectory(prefix="casysid-") as directory:
+        text, built = Path(directory) / "kernel.c", Path(directory) / "kernel.so"
         text.write_text(source)
         _run(_compiler(), *_FLAGS, str(text), "-o", str(built), "-lm")
-        with built.open("rb") as file:
-            os.fsync(file.fileno())  # a library that lost its end crashes whoever loads it
-        os.replace(built, library)
-    for old in sorted(library.parent.glob("*.so"), key=lambda path: path.stat().st_mtime)[:-_KEPT]:
-        old.unlink(missing_ok=True)
+        return built.read_bytes()
 
 
-def _library(source: str) -> Path:
-    """Where the library of a source belongs: named by its content, the compiler and the processor."""
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    key = hashlib.sha256("\0".join([source, *_FLAGS, _target(_compiler())]).encode()).hexdigest()
-    return cache / "casysid" / "kernels" / f"{key[:32]}.so"
+def _key(source: str) -> str:
+    """What the library of a source is known by: the source, the compiler and the processor."""
+    return hashlib.sha256("\0".join([source, *_FLAGS, _target(_compiler())]).encode()).hexdigest()
 
 
-def _load(library: Path) -> Kernel:
-    kernel = ctypes.CDLL(str(library)).kernel
+def _kernel(library: bytes) -> Kernel:
+    kernel = load_library(library).kernel
     kernel.argtypes, kernel.restype = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_ssize_t], None
-    os.utime(library)
     return cast("Kernel", kernel)
 
 

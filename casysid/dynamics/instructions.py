@@ -3,6 +3,9 @@
 An SX function is straight-line code. :func:`interpret` walks it and hands every operation to an :class:`Interpreter`:
 one turns it into NumPy calls on rows of samples (:mod:`~casysid.dynamics.replay`), the other into C on vectors of
 samples (:mod:`~casysid.dynamics.compiled`).
+
+Both give the same bits. What IEEE 754 rounds in one way only (sums, products, quotients, roots, comparisons) NumPy may
+do. Sines, powers and the like are the C library's in both: NumPy has its own, which differ from it in the last bits.
 """
 
 from __future__ import annotations
@@ -12,7 +15,6 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 import casadi as ca
 import numpy as np
-from scipy.special import erf
 
 from casysid.errors import ParameterError
 
@@ -20,17 +22,27 @@ Value = TypeVar("Value")
 
 
 class Operation(NamedTuple):
-    """One scalar operation: for NumPy as ``array(*operands, out=...)``, and as a C expression of ``{0}`` and ``{1}``.
+    """One scalar operation: on rows of samples, and as a C expression of ``{0}`` and ``{1}``.
 
     ``name(...)`` in C is a function of ``double`` for each sample of a vector; the rest is arithmetic on vectors.
+
+    Attributes:
+        array: NumPy's ``array(*operands, out=...)``, or CasADi's function of expressions when ``from_library``.
+        c: The C expression.
+        from_library: Whether the C library computes it.
     """
 
     array: Callable[..., Any]
     c: str
+    from_library: bool = False
 
 
 def _if_else_zero(condition: Any, value: Any, out: Any) -> None:
     out[...] = np.where(condition, value, 0.0)
+
+
+def _library(expression: Callable[..., Any], name: str, operands: str = "{0}") -> Operation:
+    return Operation(expression, f"{name}({operands})", from_library=True)
 
 
 OPERATIONS: dict[int, Operation] = {
@@ -43,28 +55,28 @@ OPERATIONS: dict[int, Operation] = {
     ca.OP_INV: Operation(np.reciprocal, "1.0 / {0}"),
     ca.OP_SQ: Operation(np.square, "{0} * {0}"),
     ca.OP_TWICE: Operation(lambda x, out: np.add(x, x, out=out), "{0} + {0}"),
-    ca.OP_POW: Operation(np.power, "pow({0}, {1})"),
-    ca.OP_CONSTPOW: Operation(np.power, "pow({0}, {1})"),
+    ca.OP_POW: _library(ca.power, "pow", "{0}, {1}"),
+    ca.OP_CONSTPOW: _library(ca.constpow, "pow", "{0}, {1}"),
     ca.OP_SQRT: Operation(np.sqrt, "sqrt({0})"),
-    ca.OP_EXP: Operation(np.exp, "exp({0})"),
-    ca.OP_EXPM1: Operation(np.expm1, "expm1({0})"),
-    ca.OP_LOG: Operation(np.log, "log({0})"),
-    ca.OP_LOG1P: Operation(np.log1p, "log1p({0})"),
-    ca.OP_SIN: Operation(np.sin, "sin({0})"),
-    ca.OP_COS: Operation(np.cos, "cos({0})"),
-    ca.OP_TAN: Operation(np.tan, "tan({0})"),
-    ca.OP_ASIN: Operation(np.arcsin, "asin({0})"),
-    ca.OP_ACOS: Operation(np.arccos, "acos({0})"),
-    ca.OP_ATAN: Operation(np.arctan, "atan({0})"),
-    ca.OP_ATAN2: Operation(np.arctan2, "atan2({0}, {1})"),
-    ca.OP_SINH: Operation(np.sinh, "sinh({0})"),
-    ca.OP_COSH: Operation(np.cosh, "cosh({0})"),
-    ca.OP_TANH: Operation(np.tanh, "tanh({0})"),
-    ca.OP_ASINH: Operation(np.arcsinh, "asinh({0})"),
-    ca.OP_ACOSH: Operation(np.arccosh, "acosh({0})"),
-    ca.OP_ATANH: Operation(np.arctanh, "atanh({0})"),
-    ca.OP_ERF: Operation(erf, "erf({0})"),
-    ca.OP_HYPOT: Operation(np.hypot, "hypot({0}, {1})"),
+    ca.OP_EXP: _library(ca.exp, "exp"),
+    ca.OP_EXPM1: _library(ca.expm1, "expm1"),
+    ca.OP_LOG: _library(ca.log, "log"),
+    ca.OP_LOG1P: _library(ca.log1p, "log1p"),
+    ca.OP_SIN: _library(ca.sin, "sin"),
+    ca.OP_COS: _library(ca.cos, "cos"),
+    ca.OP_TAN: _library(ca.tan, "tan"),
+    ca.OP_ASIN: _library(ca.asin, "asin"),
+    ca.OP_ACOS: _library(ca.acos, "acos"),
+    ca.OP_ATAN: _library(ca.atan, "atan"),
+    ca.OP_ATAN2: _library(ca.atan2, "atan2", "{0}, {1}"),
+    ca.OP_SINH: _library(ca.sinh, "sinh"),
+    ca.OP_COSH: _library(ca.cosh, "cosh"),
+    ca.OP_TANH: _library(ca.tanh, "tanh"),
+    ca.OP_ASINH: _library(ca.asinh, "asinh"),
+    ca.OP_ACOSH: _library(ca.acosh, "acosh"),
+    ca.OP_ATANH: _library(ca.atanh, "atanh"),
+    ca.OP_ERF: _library(ca.erf, "erf"),
+    ca.OP_HYPOT: _library(ca.hypot, "hypot", "{0}, {1}"),
     ca.OP_FABS: Operation(np.fabs, "fabs({0})"),
     ca.OP_SIGN: Operation(np.sign, "sign({0})"),
     ca.OP_COPYSIGN: Operation(np.copysign, "copysign({0}, {1})"),

@@ -18,7 +18,7 @@ from casysid.dynamics.bulk import Bulk
 from casysid.dynamics.drive import FrictionPart, Parameter, PartMaker, continued_positions
 from casysid.dynamics.friction import DEFAULT_FRICTION, Coupling, Direction, FrictionKind, Law
 from casysid.dynamics.joints import constant
-from casysid.dynamics.template import Template, build_template, finish_template
+from casysid.dynamics.template import Expressions, Sensing, Template, build_template, finish_template
 from casysid.errors import ParameterError
 from casysid.robot import Robot
 
@@ -55,6 +55,12 @@ class Regressor:
     def names(self) -> tuple[str, ...]:
         """Names of the p columns."""
         return tuple(parameter.name for parameter in self.parameters)
+
+    @cached_property
+    def column_kinds(self) -> tuple[str, ...]:
+        """Of each of the p columns its kind of friction; empty for a link's."""
+        kinds = {column: part.kind.kind for part in self.parts for column in part.columns}
+        return tuple(kinds.get(column, "") for column in range(len(self.parameters)))
 
     @cached_property
     def prior(self) -> Array:
@@ -226,7 +232,7 @@ def build_regressor(
     kinds, coupled = [column.kind for column in friction], [coupling.name for coupling in couplings]
     if len(set(kinds)) != len(kinds) or len(set(coupled)) != len(coupled):
         raise ParameterError(f"friction: every kind and every coupling once; got {kinds} and {coupled}")
-    template = build_template(robot, friction, couplings, quasi_static, gains.tolist())
+    template = build_template(robot, friction, couplings, Sensing(tuple(gains.tolist()), quasi_static))
     by_name = {kind.kind: kind for kind in friction}
     parts = tuple(replace(part, kind=by_name[part.kind.kind]) for part in template.parts)
     return Regressor(
@@ -244,8 +250,8 @@ def extend_regressor(regressor: Regressor, additions: Sequence[tuple[FrictionKin
     Raises:
         ParameterError: A kind does not act along its direction, or uses a position that is none.
     """
-    robot, state = regressor.robot, symbolic.State.of(regressor.robot)
-    part_along = PartMaker(robot, state)
+    robot, state, sensing = regressor.robot, symbolic.State.of(regressor.robot), regressor.template.sensing
+    part_along = PartMaker(robot, sensing.state_of_drives(state))
     found = [(kind, direction, next(part_along(kind, direction), None)) for kind, direction in additions]
     missing = [f"{kind.kind} of {direction.name}" for kind, direction, part in found if part is None]
     if missing:
@@ -259,13 +265,14 @@ def extend_regressor(regressor: Regressor, additions: Sequence[tuple[FrictionKin
             for parameter in part.parameters
         ),
     )
-    matrix = ca.horzcat(ca.SX(robot.nv, 0), *(part.torques for part in extra))
+    more = sensing.matrix @ ca.horzcat(ca.SX(robot.nv, 0), *(part.torques for part in extra))
     theta, p = ca.SX.sym("parameters", len(parameters)), len(regressor.parameters)
-    inputs, known = (state.q, state.v, state.a), ca.SX.sym("histories", regressor.history_count)
-    earlier = [known] if regressor.history_count else []
-    Y = ca.horzcat(regressor.function(*inputs, *earlier), matrix)
-    tau = regressor.torque(*inputs, theta[:p], *earlier) + matrix @ theta[p:]
-    template = finish_template(robot, state, parameters, Y, theta, tau, extra, known)
+    known = ca.SX.sym("histories", regressor.history_count)
+    inputs, earlier = (state.q, state.v, state.a), [known] if regressor.history_count else []
+    Y = ca.horzcat(regressor.function(*inputs, *earlier), more)
+    tau = regressor.torque(*inputs, theta[:p], *earlier) + more @ theta[p:]
+    histories = ca.vertcat(known, *(part.histories for part in extra))
+    template = finish_template(robot, state, sensing, Expressions(parameters, Y, theta, tau, histories), extra)
     return Regressor(template=template, numbers=_numbers(template.parts), parts=(*regressor.parts, *template.parts))
 
 

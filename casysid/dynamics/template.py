@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -32,6 +32,51 @@ KEPT = 4
 """Templates that are kept for the next regressor."""
 
 
+@dataclass(frozen=True)
+class Sensing:
+    """What of a robot's torques is measured.
+
+    Attributes:
+        gains: Measured torque over true torque of every degree of freedom, (nv,).
+        quasi_static: Whether nothing inertial is in it.
+    """
+
+    gains: tuple[float, ...]
+    quasi_static: bool = False
+
+    def state_of_links(self, state: symbolic.State) -> symbolic.State:
+        """The motion whose torques are measured, of links."""
+        still = ca.SX(len(self.gains), 1)
+        return symbolic.State(state.q, still, still) if self.quasi_static else state
+
+    def state_of_drives(self, state: symbolic.State) -> symbolic.State:
+        """The same of drives, whose friction is there in slow motion as well."""
+        return symbolic.State(state.q, state.v, ca.SX(len(self.gains), 1)) if self.quasi_static else state
+
+    @property
+    def matrix(self) -> Any:
+        """The gains as a diagonal matrix."""
+        return ca.diag(constant(np.array(self.gains)))
+
+
+class Expressions(NamedTuple):
+    """A regressor as CasADi expressions: what its columns multiply, themselves, and their sum for ``theta``.
+
+    Attributes:
+        parameters: Of the p columns.
+        Y: Shape (nv, p).
+        theta: Symbols for the parameters, (p,).
+        tau: ``Y θ``, (nv,).
+        histories: Symbols for what friction remembers, (m,).
+    """
+
+    parameters: tuple[Parameter, ...]
+    Y: Any
+    theta: Any
+    tau: Any
+    histories: Any
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Template:
     """``tau = Y(q, v, a, histories; numbers) θ``.
@@ -42,13 +87,15 @@ class Template:
         function: ``casadi.Function`` ``(q, v, a, histories, numbers) -> Y``, sparse, shape (nv, p).
         torque: ``casadi.Function`` ``(q, v, a, parameters, histories, numbers) -> tau``.
         parts: Friction whose open numbers are the last input, in the order of its columns.
+        sensing: What of the torques is measured.
     """
 
     robot: Robot
     parameters: tuple[Parameter, ...]
     function: Any
     torque: Any
-    parts: tuple[FrictionPart, ...] = ()
+    parts: tuple[FrictionPart, ...]
+    sensing: Sensing
 
     @cached_property
     def row_columns(self) -> tuple[npt.NDArray[np.intp], ...]:
@@ -82,8 +129,7 @@ def build_template(
     robot: Robot,
     friction: Sequence[FrictionKind],
     couplings: Sequence[Coupling],
-    quasi_static: bool,
-    gains: Sequence[float],
+    sensing: Sensing,
 ) -> Template:
     """The template for some friction, whatever its numbers; arguments as :func:`~casysid.dynamics.build_regressor`.
 
@@ -91,7 +137,7 @@ def build_template(
         ParameterError: A coupling names an unknown joint, or a column uses a position that is none.
     """
     numberless = tuple(kind.with_open_numbers() for kind in friction)
-    arguments = robot, numberless, tuple(couplings), quasi_static, tuple(gains)
+    arguments = robot, numberless, tuple(couplings), sensing
     try:
         return _kept(*arguments)
     except TypeError:  # a kind holds what cannot be hashed, such as a velocity for each joint's name
@@ -99,38 +145,28 @@ def build_template(
 
 
 def finish_template(
-    robot: Robot,
-    state: symbolic.State,
-    parameters: tuple[Parameter, ...],
-    Y: Any,
-    theta: Any,
-    tau: Any,
-    parts: Sequence[SymbolicPart],
-    histories: Any,
+    robot: Robot, state: symbolic.State, sensing: Sensing, found: Expressions, parts: Sequence[SymbolicPart]
 ) -> Template:
-    """The functions of expressions for ``Y`` and ``tau`` in a state, ``theta`` and the parts' open numbers.
-
-    The parts' columns and histories are the last ones.
-    """
+    """The functions of expressions in a state and the parts' open numbers; the parts' columns are the last ones."""
     inputs, names = [state.q, state.v, state.a], ["q", "v", "a"]
     numbers = ca.vertcat(ca.SX(0, 1), *(part.numbers for part in parts))
-    histories = ca.vertcat(histories, *(part.histories for part in parts))
-    columns = iter(range(len(parameters) - sum(len(part.parameters) for part in parts), len(parameters)))
+    p = len(found.parameters)
+    columns = iter(range(p - sum(len(part.parameters) for part in parts), p))
     return Template(
         robot=robot,
-        parameters=parameters,
+        parameters=found.parameters,
         function=ca.Function(
             "regressor",
-            [*inputs, histories, numbers],
-            [ca.sparsify(Y)],
+            [*inputs, found.histories, numbers],
+            [ca.sparsify(found.Y)],
             [*names, "histories", "numbers"],
             ["Y"],
             {"cse": True},
         ),
         torque=ca.Function(
             "torque",
-            [*inputs, theta, histories, numbers],
-            [ca.densify(tau)],
+            [*inputs, found.theta, found.histories, numbers],
+            [ca.densify(found.tau)],
             [*names, "parameters", "histories", "numbers"],
             ["tau"],
             {"cse": True},
@@ -138,28 +174,24 @@ def finish_template(
         parts=tuple(
             FrictionPart(part.kind, part.direction, tuple(islice(columns, len(part.parameters)))) for part in parts
         ),
+        sensing=sensing,
     )
 
 
 def _build(
-    robot: Robot,
-    friction: tuple[FrictionKind, ...],
-    couplings: tuple[Coupling, ...],
-    quasi_static: bool,
-    gains: tuple[float, ...],
+    robot: Robot, friction: tuple[FrictionKind, ...], couplings: tuple[Coupling, ...], sensing: Sensing
 ) -> Template:
-    state, still = symbolic.State.of(robot), ca.SX(robot.nv, 1)
-    motions = symbolic.link_motions(robot, symbolic.State(state.q, still, still) if quasi_static else state)
-    part_along = PartMaker(robot, symbolic.State(state.q, state.v, still) if quasi_static else state)
-    parts = list(drive_parts(part_along, friction, couplings))
-    drive_matrix = ca.horzcat(ca.SX(robot.nv, 0), *(part.torques for part in parts))
+    state = symbolic.State.of(robot)
+    motions = symbolic.link_motions(robot, sensing.state_of_links(state))
+    parts = list(drive_parts(PartMaker(robot, sensing.state_of_drives(state)), friction, couplings))
+    drives = ca.horzcat(ca.SX(robot.nv, 0), *(part.torques for part in parts))
     parameters = (*_inertial_parameters(robot), *(parameter for part in parts for parameter in part.parameters))
-    rigid = robot.inertial_parameters.size
-    theta = ca.SX.sym("parameters", len(parameters))
-    measured = ca.diag(constant(np.array(gains)))
-    Y = measured @ ca.horzcat(symbolic.regressor(robot, motions), drive_matrix)
-    tau = measured @ (symbolic.inverse_dynamics(robot, motions, theta[:rigid]) + drive_matrix @ theta[rigid:])
-    return finish_template(robot, state, parameters, Y, theta, tau, parts, ca.SX(0, 1))
+    theta, rigid = ca.SX.sym("parameters", len(parameters)), robot.inertial_parameters.size
+    Y = ca.horzcat(symbolic.regressor(robot, motions), drives)
+    tau = symbolic.inverse_dynamics(robot, motions, theta[:rigid]) + drives @ theta[rigid:]
+    histories = ca.vertcat(ca.SX(0, 1), *(part.histories for part in parts))
+    found = Expressions(parameters, sensing.matrix @ Y, theta, sensing.matrix @ tau, histories)
+    return finish_template(robot, state, sensing, found, parts)
 
 
 _kept = lru_cache(KEPT)(_build)

@@ -128,6 +128,13 @@ class Estimate:
             object.__setattr__(self, name, frozen(getattr(self, name)))
         object.__setattr__(self, "diagnostics", MappingProxyType(dict(self.diagnostics)))
 
+    def __getstate__(self) -> dict[str, object]:
+        return {**self.__dict__, "diagnostics": dict(self.diagnostics)}
+
+    def __setstate__(self, state: Mapping[str, object]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
+
     @property
     def std(self) -> Array:
         """Standard errors of the parameters, shape (p,)."""

@@ -45,7 +45,8 @@ UNDECIDED = 1e-6
 INFLATION_EVERY = 8
 """Rounds from one ``κ`` to the next: it changes little, and costs as much as several rounds."""
 STEADY = 2e-2
-"""Change of ``log λ`` that ends the search: a hundredth in a deviation."""
+"""Change of ``log λ`` that ends the search: a hundredth in a deviation; that of a group of which the data decide less
+than one parameter counts by so much less."""
 LINKS, UNOWNED = "links", "columns"
 """Names of the groups that are measured from the prior; drives are measured from zero."""
 
@@ -160,11 +161,11 @@ class EvidenceProblem:
             mean = C @ normal.xy
             new = mean if feasible is None else feasible(mean, P, normal.residual_energy(mean))
             step = new - delta
-            moved, delta = float(np.sqrt(max(step @ normal.xx @ step, 0.0))), new
+            moved, delta = float(np.sqrt(max(float(step @ normal.xx @ step), 0.0))), new
             variance = self._variances(totals, delta, C)
             decided = np.array([self._decided(group, C, size) for group, size in zip(self.groups, sizes, strict=True)])
             wanted: Array = self._sizes(delta, C, decided, careful=iteration <= CAREFUL_ROUNDS)
-            change = float(np.abs(np.log(wanted / sizes)).max(initial=0.0))
+            change = float((np.abs(np.log(wanted / sizes)) * np.minimum(decided, 1.0)).max(initial=0.0))
             sizes = wanted
             if iteration % INFLATION_EVERY == 1:
                 kappa = self._inflation(delta, variance)

@@ -13,13 +13,15 @@ from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
 from casysid.errors import ParameterError
 from casysid.excitation.problem import ExcitationProblem
-from casysid.moments import read_moments
+from casysid.moments_file import read_moments
 from casysid.recording import Recording
 from casysid.signals import motion_band, motion_from_recording
 from casysid.threads import single_threaded
 
 CUTOFF_OVER_BAND = 3.0
 """Low-pass cut-off over the frequency that holds nearly all of a recording's motion."""
+MOST_SAMPLES = 1e12
+"""Of one identification: a month of a hundred robots at 1 kHz has 3e11."""
 HIGHEST_SHARE_OF_RATE = 0.35
 """Of the rate of samples; no cut-off is higher."""
 
@@ -76,8 +78,11 @@ def after_result(problem: ExcitationProblem, path: str | Path) -> ExcitationProb
 def _samples(path: Path) -> float:
     """How many were fitted."""
     try:
-        return float(json.loads(path.read_text(encoding="utf-8"))["samples"]["train"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        samples = float(json.loads(path.read_bytes().decode("utf-8"))["samples"]["train"])
+        if not 0.0 <= samples <= MOST_SAMPLES:
+            raise ValueError(f"{samples:g} samples were fitted")
+        return samples
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
         raise ParameterError(f"{path}: this is no result.json as casysid identify writes it ({error})") from error
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from casysid.arrays import Array
 from casysid.errors import ParameterError, SolverError
 from casysid.excitation.results import ExcitationDesign
 from casysid.excitation.words import describe
+from casysid.outputs import MANIFEST, Stage, run_folder, write_whole
 from casysid.recording import Recording
 
 MESSAGE_RATE = 100.0
@@ -26,18 +27,28 @@ def write_excitation(design: ExcitationDesign, directory: str | Path, *, rate: f
     The samples are time, ``q_``, ``v_``, ``a_`` and the torque ``tau_`` that the prior model expects, by joint, as
     :func:`casysid.recording.read_recording` reads them.
 
+    Files of an earlier run there go, its pictures too; files of others stay.
+
     Args:
         design: Checked again before anything is written.
         directory: Made if it is not there.
         rate: Samples per second [Hz]; None takes the problem's.
 
     Returns:
-        The files.
+        The files, the last one of which lists them.
 
     Raises:
         SolverError: The motion violates a limit; nothing is written. The message names who, when and by how much.
         ParameterError: The rate is not positive.
+        OutputError: They cannot be written; the directory is as it was.
     """
+    with run_folder(directory, identity_of(design)) as stage:
+        files = add_excitation(design, stage, rate=rate)
+    return *files, stage.home / MANIFEST
+
+
+def add_excitation(design: ExcitationDesign, stage: Stage, *, rate: float | None = None) -> tuple[Path, ...]:
+    """Write what :func:`write_excitation` writes to where a run's files wait; the paths that they will have."""
     rate = design.problem.rate if rate is None else rate
     if not (np.isfinite(rate) and rate > 0.0):
         raise ParameterError(f"write_excitation: rate must be a positive number of samples per second; got {rate}")
@@ -49,15 +60,20 @@ def write_excitation(design: ExcitationDesign, directory: str | Path, *, rate: f
                 f"excitation: the trajectory is not written, it violates {len(checked.violations)} limit(s), worst: "
                 f"{checked.violations[0]}. Design it again"
             )
-    folder = Path(directory)
-    folder.mkdir(parents=True, exist_ok=True)
-    samples_path = sample_recording(design, rate).write(folder / "excitation.csv")
+    sample_recording(design, rate).write(stage.folder / "excitation.csv")
     texts = {
-        "excitation.json": json.dumps(coefficients(design), indent=1, ensure_ascii=False) + "\n",
+        "excitation.json": _json(design),
         "joint_trajectory.yaml": "\n".join(_message(design, min(rate, MESSAGE_RATE))) + "\n",
         "excitation.txt": "\n".join(describe(design)) + "\n",
     }
-    return samples_path, *(_write(folder / name, text) for name, text in texts.items())
+    for name, text in texts.items():
+        write_whole(stage.folder / name, text.encode(errors="backslashreplace"))
+    return tuple(stage.home / name for name in ("excitation.csv", *texts))
+
+
+def identity_of(design: ExcitationDesign) -> str:
+    """What tells a motion from others: a digest of its coefficients."""
+    return hashlib.sha256(_json(design).encode(errors="backslashreplace")).hexdigest()
 
 
 def sample_recording(design: ExcitationDesign, rate: float) -> Recording:
@@ -134,11 +150,5 @@ def _rows(motion: tuple[Array, ...], k: int) -> Iterator[tuple[str, Array]]:
         yield name, values[k]
 
 
-def _write(path: Path, text: str) -> Path:
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
-    return path
+def _json(design: ExcitationDesign) -> str:
+    return json.dumps(coefficients(design), indent=1, ensure_ascii=False) + "\n"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from casysid.arrays import Array
 from casysid.dynamics import (
@@ -18,6 +20,7 @@ from casysid.dynamics import (
     Viscous,
 )
 from casysid.dynamics.friction import coupling_direction, joint_directions
+from casysid.dynamics.friction.wave_numbers import ripple_wave_numbers
 from casysid.robot import JointKind, Robot
 
 SIMPLE_JOINTS = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
@@ -102,6 +105,30 @@ def joint_uses(robot: Robot, speed: Array, width: Array, travel: Array | None = 
         dof: JointUse(direction, float(speed[dof]), float(width[dof]), None if travel is None else float(travel[dof]))
         for dof, direction in joint_directions(robot).items()
     }
+
+
+def with_ripples(
+    uses: Mapping[int, JointUse], position: Array, velocity: Array, residual: Array, band: float
+) -> dict[int, JointUse]:
+    """The uses with the wave numbers that a residual torque shows.
+
+    Args:
+        uses: How degrees of freedom move, by their index.
+        position: Of every degree of freedom, samples in order of time, shape (N, nv).
+        velocity: Shape (N, nv).
+        residual: Torque that a first model leaves, shape (N, nv).
+        band: Up to which the equations hold [Hz]: faster waves at the usual speed are not seen.
+    """
+    found = dict(uses)
+    for dof, use in uses.items():
+        if use.speed > 0.0:
+            s, r, highest = position[:, dof], residual[:, dof], 2.0 * np.pi * band / use.speed
+            ripple, dry = (
+                ripple_wave_numbers(s, one, highest, unlimited=use.direction.unlimited)
+                for one in (r, r * np.tanh(velocity[:, dof] / use.width))
+            )
+            found[dof] = replace(use, ripple=ripple, friction_ripple=dry)
+    return found
 
 
 def joined(friction: Sequence[FrictionKind], couplings: Sequence[Coupling], taken: Sequence[Proposal]) -> FrictionModel:

@@ -24,7 +24,7 @@ from casysid.dynamics import Coulomb, LoadedCoulomb, MaxwellSlip, PowerViscous, 
 from casysid.errors import ParameterError
 from casysid.identification.passes import Passes
 from casysid.moments import Moments
-from casysid.recording import Recording
+from casysid.recording import Source
 from casysid.signals import InputNoise, NoiseLevels, find_input_noise, mean_input_noise
 
 DRAWS = 2
@@ -48,13 +48,13 @@ def with_noise(
         levels: What is known of the sensors.
     """
     as_logged = passes.band.cutoff is None
-    recordings = [one.in_memory() for one in passes.recordings]
+    recordings = passes.recordings
     noise = tuple(find_input_noise(one, levels, as_logged=as_logged) for one in recordings)
     together = mean_input_noise(noise)
     if together is None:
         return moments, None
 
-    def sums_of(disturbed: Sequence[Recording]) -> Moments:
+    def sums_of(disturbed: Sequence[Source]) -> Moments:
         return passes.disturbed(disturbed).moments(regressor)
 
     added = noise_moments(regressor, recordings, noise, moments, sums_of, as_logged=as_logged)
@@ -63,10 +63,10 @@ def with_noise(
 
 def noise_moments(
     regressor: Regressor,
-    recordings: Sequence[Recording],
+    recordings: Sequence[Source],
     noise: Sequence[InputNoise | None],
     moments: Moments,
-    sums_of: Callable[[Sequence[Recording]], Moments],
+    sums_of: Callable[[Sequence[Source]], Moments],
     *,
     as_logged: bool,
 ) -> tuple[Array, ...]:

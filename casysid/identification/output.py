@@ -1,44 +1,67 @@
-"""A result on disk: ``result.json``, the identified model and the moments, each whole or not at all."""
+"""A result on disk: ``result.json``, the identified model and the moments, all at once or not at all."""
 
 from __future__ import annotations
 
+import hashlib
 import json
-import os
 from pathlib import Path
 
 from casysid.identification.plain_friction import nearest_plain_friction
 from casysid.identification.result import JOINT_KINDS, IdentificationResult, without_infinities
 from casysid.identification.verdict import judge
-from casysid.moments import write_moments
+from casysid.moments_file import write_moments
+from casysid.outputs import Stage, run_folder, write_whole
 from casysid.robot import write_robot
 
 
 def write_result(
-    result: IdentificationResult, directory: Path, *, export_inconsistent: bool = False
+    result: IdentificationResult, directory: str | Path, *, export_inconsistent: bool = False
 ) -> tuple[str, ...]:
     """Write ``result.json``, ``moments.npz``, and ``identified.urdf`` or ``identified.xml`` into a directory.
 
+    Files of an earlier run there go, its report too; files of others stay.
+
     Returns:
         What a person should know about the written model, one sentence each.
+
+    Raises:
+        OutputError: They cannot be written; the directory is as it was.
     """
-    directory.mkdir(parents=True, exist_ok=True)
-    notes = _write_model(result, directory, export_inconsistent)
+    home = Path(directory)
+    with run_folder(home, identity_of(result), claims=[model_path(result, home).name]) as stage:
+        return add_result(result, stage, export_inconsistent=export_inconsistent)
+
+
+def add_result(result: IdentificationResult, stage: Stage, *, export_inconsistent: bool = False) -> tuple[str, ...]:
+    """Write what :func:`write_result` writes to where a run's files wait; returns what it returns."""
+    notes = _write_model(result, stage, export_inconsistent)
     verdict = judge(result)
     content = {
         **result.to_json(),
         "verdict": {"accepted": verdict.accepted, "reasons": list(verdict.reasons), "remarks": list(verdict.remarks)},
         "model_notes": list(notes),
     }
-    write_moments(result.moments, directory / "moments.npz")
-    write_json(content, directory / "result.json")
+    write_moments(result.moments, stage.folder / "moments.npz")
+    write_json(content, stage.folder / "result.json")
     return notes
 
 
-def write_json(content: object, path: Path) -> None:
-    """Indented JSON through a temporary name; infinities and NaN become null."""
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(json.dumps(without_infinities(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    os.replace(temporary, path)
+def identity_of(result: IdentificationResult) -> str:
+    """What tells a result from others: a digest of all that ``result.json`` says."""
+    return hashlib.sha256(_json(result.to_json())).hexdigest()
+
+
+def write_json(content: object, path: str | Path) -> None:
+    """Indented JSON, whole or not at all; infinities and NaN become null.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
+    write_whole(path, _json(content))
+
+
+def _json(content: object) -> bytes:
+    return (json.dumps(without_infinities(content), indent=2, allow_nan=False) + "\n").encode()
 
 
 def model_path(result: IdentificationResult, directory: Path) -> Path:
@@ -46,10 +69,9 @@ def model_path(result: IdentificationResult, directory: Path) -> Path:
     return directory / ("identified.urdf" if result.robot.source_format == "urdf" else "identified.xml")
 
 
-def _write_model(result: IdentificationResult, directory: Path, export_inconsistent: bool) -> tuple[str, ...]:
-    path = model_path(result, directory)
+def _write_model(result: IdentificationResult, stage: Stage, export_inconsistent: bool) -> tuple[str, ...]:
+    path = model_path(result, stage.home)
     if not (result.is_physically_consistent or export_inconsistent):
-        path.unlink(missing_ok=True)
         return (f"{path.name} is withheld because the parameters are not physically consistent.",)
     homeless = _homeless(result)
     plain = nearest_plain_friction(result.regressor, result.parameters, result.moments, homeless)
@@ -60,6 +82,7 @@ def _write_model(result: IdentificationResult, directory: Path, export_inconsist
         damping=plain["viscous"],
         dry_friction=plain["coulomb"],
         armature=result.drive_vector("armature"),
+        keep_as=stage.folder / path.name,
     )
     if not homeless:
         return written.notes

@@ -1,8 +1,13 @@
-"""The one place where recordings are smoothed and their equations summed; both are counted."""
+"""The one place where recordings are smoothed and their equations summed; both are counted.
+
+Short recordings are smoothed once and kept. Long ones are smoothed anew in every pass, piece by piece, each with so
+many samples beside it that the smoothing has forgotten where it ends; only sums are kept, so memory does not grow with
+the length. What is chosen from the data is then chosen by excerpts.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import repeat
 
@@ -16,7 +21,7 @@ from casysid.identification.tuning.band import BandChoice
 from casysid.moments import Moments
 from casysid.recording import Source
 from casysid.robot import Robot
-from casysid.signals import BandAverage, Motion, motion_from_recording
+from casysid.signals import BandAverage, Motion, motion_from_recording, motion_pieces
 
 SAMPLES_PER_PERIOD = 100
 """Of the equations' cut-off: a boxcar of so many samples a period has a gain of ``1 - 1.6e-4`` there."""
@@ -27,12 +32,28 @@ NEAR_REST = 2.5
 """A joint slower than so many widths is near rest: beyond, the smooth sign is within 1.4 % of one."""
 MINIMUM_BLOCKS = 4
 """Of every recording: the fewest of which folds and scores tell anything."""
+EXCERPTS, EXCERPT_ROWS = 8, 1 << 14
+"""Of a long recording: a quarter of a minute each at 1 kHz. A motion of seven joints then takes some 30 MB."""
 
 Mask = npt.NDArray[np.bool_]
 
 
+def is_long(recordings: Sequence[Source]) -> bool:
+    """Whether recordings together have more samples than are kept smoothed."""
+    return sum(map(len, recordings)) > EXCERPTS * EXCERPT_ROWS and all(one.has_time for one in recordings)
+
+
+def excerpts(recordings: Sequence[Source]) -> tuple[Source, ...]:
+    """The recordings themselves, or of long ones excerpts, evenly over each."""
+    if not is_long(recordings):
+        return tuple(recordings)
+    share = EXCERPT_ROWS * EXCERPTS // len(recordings)
+    count = max(1, min(EXCERPTS, share // 4096))
+    return tuple(part for one in recordings for part in one.excerpts(count, max(share // count, 1)))
+
+
 class Passes:
-    """Recordings smoothed once, and summed as often as asked.
+    """Recordings smoothed, and summed as often as asked.
 
     Attributes:
         robot: The robot.
@@ -68,7 +89,7 @@ class Passes:
 
     @cached_property
     def motions(self) -> tuple[Motion, ...]:
-        """The recordings smoothed, at all their samples."""
+        """The recordings smoothed, at all their samples; not to be asked of long ones."""
         self.smoothings += 1
         return tuple(
             motion_from_recording(self.robot, one, self.band.smoothing, delays=self._delays) for one in self.recordings
@@ -77,11 +98,8 @@ class Passes:
     @cached_property
     def sparse_motions(self) -> tuple[Motion, ...]:
         """The same at as many samples as the equations need, their torque averaged, without what ends spoil."""
-        if self.band.cutoff is None:
-            return self.motions
         return tuple(
-            motion.decimated(int(one.rate / (SAMPLES_PER_PERIOD * self.band.cutoff))).without_ends()
-            for motion, one in zip(self.motions, self.recordings, strict=True)
+            _sparse(motion, self._stride(one)) for motion, one in zip(self.motions, self.recordings, strict=True)
         )
 
     @cached_property
@@ -105,8 +123,7 @@ class Passes:
         """When each joint stands or turns round, in the sparse motions, shape (N, nv) each; None without time."""
         if self.band.cutoff is None:
             return None
-        slow = NEAR_REST * self.width
-        return tuple(motion.standing | (np.abs(motion.v) < slow) for motion in self.sparse_motions)
+        return tuple(self._near_rest(motion) for motion in self.sparse_motions)
 
     def blocks_of_each(self) -> int:
         """Blocks of time of every recording."""
@@ -115,6 +132,9 @@ class Passes:
     def moments(self, regressor: Regressor) -> Moments:
         """One pass: moments of all recordings, their blocks one after the other, equations near rest apart."""
         self.passes += 1
+        if is_long(self.recordings):
+            self.smoothings += 1
+            return _added([self._long_moments(regressor, one) for one in self.recordings]).with_rows_only()
         return sum_moments(
             regressor,
             self.sparse_motions,
@@ -124,13 +144,63 @@ class Passes:
             threads=self._threads,
         )
 
+    def all_motions(self) -> Iterator[Motion]:
+        """One pass over the motions at all their samples, of long recordings piece by piece."""
+        self.passes += 1
+        if not is_long(self.recordings):
+            yield from self.motions
+            return
+        self.smoothings += 1
+        for recording in self.recordings:
+            for piece in motion_pieces(self.robot, recording, self.band.smoothing, delays=self._delays):
+                yield piece.motion.rows(piece.core)
+
+    def like(self, other: Passes) -> Passes:
+        """These, with the widths of other passes over the same motions."""
+        self.__dict__["width"] = other.width
+        return self
+
     def disturbed(self, recordings: Sequence[Source]) -> Passes:
         """Passes over the same recordings with other noise: the same equations are near rest."""
         other = Passes(
             self.robot, recordings, self.band, delays=self._delays, blocks=self._blocks, threads=self._threads
         )
-        other.__dict__["near_rest"] = self.near_rest
-        return other
+        if not is_long(self.recordings):
+            other.__dict__["near_rest"] = self.near_rest
+        return other.like(self)
+
+    def _long_moments(self, regressor: Regressor, recording: Source) -> Moments:
+        """Of one recording, piece by piece; windows end with their piece."""
+        blocks, groups = self.blocks_of_each(), dict[int, Moments]()
+        for piece in motion_pieces(
+            self.robot, recording, self.band.smoothing, delays=self._delays, multiple=self._stride(recording)
+        ):
+            motion = _sparse(piece.motion.rows(piece.core), self._stride(recording))
+            if not len(motion):
+                continue
+            found = sum_moments(
+                regressor,
+                [motion],
+                self.band.cutoff,
+                near_rest=[self._near_rest(motion)],
+                blocks=1,
+                threads=self._threads,
+                only_rows=False,
+            )
+            share = (motion.time[0] - recording.start) / max(recording.duration, np.finfo(np.float64).tiny)
+            place = min(int(blocks * share), blocks - 1)
+            groups[place] = (groups[place] + found).merged_blocks([[0, 1]]) if place in groups else found
+        return _added([groups[place] for place in sorted(groups)])
+
+    def _near_rest(self, motion: Motion) -> Mask:
+        return np.asarray(motion.standing | (np.abs(motion.v) < NEAR_REST * self.width))
+
+    def _stride(self, recording: Source) -> int:
+        """Samples that are averaged into one, an odd number."""
+        if self.band.cutoff is None:
+            return 1
+        stride = max(int(recording.rate / (SAMPLES_PER_PERIOD * self.band.cutoff)), 1)
+        return stride - 1 + stride % 2
 
 
 def sum_moments(
@@ -141,6 +211,7 @@ def sum_moments(
     near_rest: Sequence[Mask] | None = None,
     blocks: int = MINIMUM_BLOCKS,
     threads: int = 2,
+    only_rows: bool = True,
 ) -> Moments:
     """Moments of motions, the blocks of each after those of the one before.
 
@@ -151,6 +222,7 @@ def sum_moments(
         near_rest: When a joint's equations are rows of their own, shape (N, nv) by motion; None keeps them together.
         blocks: Of each motion.
         threads: Of the evaluation.
+        only_rows: Whether joints near rest that have no row are left out.
     """
     parts = [
         accumulate_moments(
@@ -166,7 +238,16 @@ def sum_moments(
         )
         for motion, mask in zip(motions, near_rest or repeat(None), strict=False)
     ]
+    total = _added(parts)
+    return total.with_rows_only() if only_rows else total
+
+
+def _added(parts: Sequence[Moments]) -> Moments:
     total = parts[0]
     for part in parts[1:]:
         total = total + part
-    return total.with_rows_only()
+    return total
+
+
+def _sparse(motion: Motion, stride: int) -> Motion:
+    return motion.decimated(stride).without_ends()

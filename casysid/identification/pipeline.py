@@ -19,8 +19,8 @@ from casysid.identification.choices import Choices
 from casysid.identification.friction_laws import friction_laws
 from casysid.identification.mistakes import find_mistakes
 from casysid.identification.noise_moments import with_noise
-from casysid.identification.passes import Passes
-from casysid.identification.prediction import torque_error
+from casysid.identification.passes import Passes, excerpts, is_long
+from casysid.identification.prediction import torque_errors
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 from casysid.identification.tuning.band import BandChoice, choose_band
@@ -34,6 +34,7 @@ from casysid.projection import ProjectionProblem, ProjectionResult, build_projec
 from casysid.recording import Source
 from casysid.robot import Robot
 from casysid.signals import InputNoise, Motion
+from casysid.signals.admission import FEWEST, FEWEST_TO_PREDICT, check_noise, check_recordings
 from casysid.threads import single_threaded
 from casysid.uncertainty import ParameterUncertainty, propagate
 
@@ -56,8 +57,10 @@ class Preparation:
         choices: What was chosen on the way.
         regressor: With the friction that was chosen.
         moments: Of the fitted recordings, with what noise added if some method needs it.
-        motions: Of the fitted recordings.
-        held_out: Motions that are only predicted.
+        motions: Of the fitted recordings, or of excerpts of long ones.
+        held_out: Motions that are only predicted, alike.
+        passes: Over the fitted recordings.
+        unseen: Over the recordings that are only predicted; None if there are none.
         input_noise: Of the measured motion; None where no method needs it, or it is not known.
         structural: Base parameters of the mechanism.
         seconds: Wall time by stage.
@@ -69,6 +72,8 @@ class Preparation:
     moments: Moments
     motions: tuple[Motion, ...]
     held_out: tuple[Motion, ...]
+    passes: Passes
+    unseen: Passes | None
     input_noise: InputNoise | None
     structural: BaseParameters
     seconds: dict[str, float]
@@ -125,6 +130,11 @@ def prepare(
     fitted = (recordings,) if isinstance(recordings, Source) else tuple(recordings)
     if not fitted:
         raise RecordingError("identify: at least one recording to fit is needed; got none")
+    for several, fewest in ((fitted, FEWEST), (held_out, FEWEST_TO_PREDICT)):
+        check_recordings(
+            several, cutoff=settings.cutoff, time_scale=settings.time_scale, delay=settings.delay, fewest=fewest
+        )
+    check_noise(fitted, settings.input_noise)
     clock = _Clock()
     fitted, held_out = (tuple(one.flipped(settings.flip) for one in several) for several in (fitted, held_out))
     progress("tuning", 0.0)
@@ -136,14 +146,30 @@ def prepare(
     if noise_too or settings.method.needs_input_noise:
         moments, noise = with_noise(moments, regressor, passes, settings.input_noise)
     scale, delay, band = chosen.choices.clock.scale, chosen.choices.delay, chosen.choices.band
-    unseen = [one.with_time_scaled(scale) for one in held_out]
-    predicted = Passes(robot, unseen, band, delays=delay.seconds).motions if unseen else ()
+    unseen = Passes(robot, [one.with_time_scaled(scale) for one in held_out], band, delays=delay.seconds)
     structural = structural_base_parameters(regressor)
     clock.lap("moments")
     progress("moments", 1.0)
     return Preparation(
-        robot, chosen.choices, regressor, moments, passes.motions, predicted, noise, structural, clock.laps
+        robot=robot,
+        choices=chosen.choices,
+        regressor=regressor,
+        moments=moments,
+        motions=chosen.looked_at.motions,
+        held_out=_shown(unseen),
+        passes=passes,
+        unseen=unseen if held_out else None,
+        input_noise=noise,
+        structural=structural,
+        seconds=clock.laps,
     )
+
+
+def _shown(passes: Passes) -> tuple[Motion, ...]:
+    """The motions of recordings, or of excerpts of long ones."""
+    if not is_long(passes.recordings):
+        return passes.motions
+    return Passes(passes.robot, excerpts(passes.recordings), passes.band).motions
 
 
 @single_threaded()
@@ -166,7 +192,11 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
     progress("check", 0.0)
     parameters = estimate.parameters if projection is None else projection.parameters
     band = preparation.choices.band.errors
-    judged = preparation.held_out or preparation.motions
+    passes, unseen = preparation.passes, preparation.unseen
+    vectors = [parameters, estimate.parameters, prior]
+    fitted = [parameters] if unseen else vectors
+    errors = torque_errors(regressor, fitted, passes.all_motions(), band)
+    judged = torque_errors(regressor, vectors, unseen.all_motions(), band) if unseen else errors
     result = IdentificationResult(
         robot=preparation.robot,
         settings=settings,
@@ -178,10 +208,10 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
         uncertainty=uncertainty,
         structural=preparation.structural,
         excited=excited_base_parameters(regressor, moments, estimate.noise_std),
-        unconstrained=torque_error(regressor, estimate.parameters, judged, band),
-        train=torque_error(regressor, parameters, preparation.motions, band),
-        held_out=torque_error(regressor, parameters, preparation.held_out, band) if preparation.held_out else None,
-        file=torque_error(regressor, prior, judged, band),
+        unconstrained=judged[1],
+        train=errors[0],
+        held_out=judged[0] if unseen else None,
+        file=judged[2],
         train_motions=preparation.motions,
         held_out_motions=preparation.held_out,
         input_noise=preparation.input_noise,
@@ -219,17 +249,19 @@ def _project(
 
 @dataclass(frozen=True, eq=False)
 class _Chosen:
-    """Choices, with the regressor, the moments and the passes that they led to."""
+    """Choices, the regressor and the moments that they led to, and passes over all and over what was looked at."""
 
     choices: Choices
     regressor: Regressor
     moments: Moments
     passes: Passes
+    looked_at: Passes
 
 
 def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, progress: Progress) -> _Chosen:
     """Band, clock, delay, friction and gains, each given those before; recordings are smoothed anew for a new clock."""
-    band = choose_band(recordings, settings.cutoff)
+    whole, recordings = recordings, excerpts(recordings)
+    band = choose_band(whole, settings.cutoff)
     passes, candidates = _gather(robot, recordings, band, settings)
     progress("tuning", 0.3)
     clock = choose_clock(passes, candidates, settings.time_scale, settings.quasi_static)
@@ -238,8 +270,8 @@ def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, prog
     settings = dataclasses.replace(settings, quasi_static=clock.quasi_static)
     work = [passes]
     if clock.scale != 1.0 or clock.quasi_static:
-        recordings = tuple(one.with_time_scaled(clock.scale) for one in recordings)
-        band = choose_band(recordings, settings.cutoff)
+        whole, recordings = (tuple(one.with_time_scaled(clock.scale) for one in some) for some in (whole, recordings))
+        band = choose_band(whole, settings.cutoff)
         passes, candidates = _gather(robot, recordings, band, settings)
         work.append(passes)
     mistakes = find_mistakes(robot, passes.sparse_motions, band.cutoff)
@@ -266,6 +298,13 @@ def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, prog
         friction,
         settings=dataclasses.replace(settings, friction=regressor.friction, couplings=regressor.couplings),
     )
+    looked_at = passes
+    if is_long(whole):
+        passes = Passes(
+            robot, whole, band, delays=delay.seconds, blocks=settings.blocks, threads=settings.threads
+        ).like(passes)
+        moments = passes.moments(regressor)
+        work.append(passes)
     choices = Choices(
         band=band,
         width=passes.width if settings.coulomb_width is None else np.full(robot.nv, settings.coulomb_width),
@@ -277,7 +316,7 @@ def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, prog
         smoothings=sum(one.smoothings for one in work),
         passes=sum(one.passes for one in work),
     )
-    return _Chosen(choices, regressor, moments, passes)
+    return _Chosen(choices, regressor, moments, passes, looked_at)
 
 
 def _gather(

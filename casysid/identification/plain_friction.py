@@ -31,11 +31,11 @@ def nearest_plain_friction(
     """
     places = {name: k for k, name in enumerate(regressor.names)}
     friction = {column for part in regressor.parts if part.kind.is_friction for column in part.columns}
-    moments, p = moments.away_from_rest(), len(regressor.names)
+    moments = moments.away_from_rest()
     found = {kind: np.zeros(len(moments.joints)) for kind in PLAIN}
     for joint, dof in enumerate(moments.joints):
         row, squares = moments.of_joint(joint)
-        gram = np.zeros((p, p))
+        gram = np.zeros((len(places), len(places)))
         gram[row[:, None], row] = squares[:, :-1, :-1].sum(axis=0)
         own = {kind: places[name] for kind in PLAIN if (name := f"{dof}.{kind}") in places}
         other = [places[name] for name in homeless if places[name] in friction]

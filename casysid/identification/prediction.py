@@ -6,10 +6,12 @@ alone, away from the ends of stretches of time; and compared once more as they a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
@@ -44,24 +46,65 @@ class TorqueError:
 
 @single_threaded()
 def torque_error(
-    regressor: Regressor, parameters: Array, motions: Sequence[Motion], cutoff: float | None
+    regressor: Regressor, parameters: Array, motions: Iterable[Motion], cutoff: float | None
 ) -> TorqueError:
     """Predict each motion's torque and compare, below ``cutoff`` [Hz] and as logged."""
-    missed = felt = 0.0
-    times, measured, predictions = list[Array](), list[Array](), list[Array]()
+    return torque_errors(regressor, [parameters], motions, cutoff)[0]
+
+
+@single_threaded()
+def torque_errors(
+    regressor: Regressor, parameters: Sequence[Array], motions: Iterable[Motion], cutoff: float | None
+) -> tuple[TorqueError, ...]:
+    """The same of several parameter vectors, in one pass over the motions."""
+    tables = [_Table() for _ in parameters]
     for motion in motions:
-        predicted = regressor.predict(parameters, motion.q, motion.v, motion.a, time=motion.time)
         inner = motion.settled if motion.settled.any() else np.ones(len(motion), dtype=bool)
-        missed += float(np.sum((motion.tau - predicted)[inner] ** 2))
-        felt += float(np.sum(motion.tau[inner] ** 2))
         weights = averages_of(motion, cutoff)
-        for kept, values in ((times, motion.time), (measured, motion.tau), (predictions, predicted)):
+        for table, theta in zip(tables, parameters, strict=True):
+            predicted = regressor.predict(theta, motion.q, motion.v, motion.a, time=motion.time)
+            table.add(motion, predicted, inner, weights)
+    return tuple(table.error() for table in tables)
+
+
+class _Table:
+    """Sums over all samples, and the averages, of one parameter vector."""
+
+    def __init__(self) -> None:
+        self._missed = self._felt = 0.0
+        self._samples = 0
+        self._times, self._measured, self._predictions = list[Array](), list[Array](), list[Array]()
+
+    def add(self, motion: Motion, predicted: Array, inner: npt.NDArray[np.bool_], weights: Any) -> None:
+        """One motion."""
+        self._samples += len(motion)
+        self._missed += float(np.sum((motion.tau - predicted)[inner] ** 2))
+        self._felt += float(np.sum(motion.tau[inner] ** 2))
+        for kept, values in (
+            (self._times, motion.time),
+            (self._measured, motion.tau),
+            (self._predictions, predicted),
+        ):
             kept.append(frozen(values[inner] if weights is None else weights @ values[inner]))
+
+    def error(self) -> TorqueError:
+        """What came together."""
+        return _error(self._samples, self._missed, self._felt, self._times, self._measured, self._predictions)
+
+
+def _error(
+    samples: int,
+    missed: float,
+    felt: float,
+    times: Sequence[Array],
+    measured: Sequence[Array],
+    predictions: Sequence[Array],
+) -> TorqueError:
     difference = np.concatenate(measured) - np.concatenate(predictions)
     residual = np.linalg.norm(difference, axis=0)
     size = np.linalg.norm(np.concatenate(measured), axis=0)
     return TorqueError(
-        samples=sum(map(len, motions)),
+        samples=samples,
         relative=_ratio(np.linalg.norm(residual), np.linalg.norm(size)),
         relative_unfiltered=_ratio(np.sqrt(missed), np.sqrt(felt)),
         rmse=frozen(residual / np.sqrt(max(len(difference), 1))),
@@ -72,7 +115,7 @@ def torque_error(
     )
 
 
-def averages_of(motion: Motion, cutoff: float | None):  # type: ignore[no-untyped-def]  # SciPy's sparse arrays have none
+def averages_of(motion: Motion, cutoff: float | None) -> Any:
     """Sparse weights of the averages over a motion's settled samples; None without a cut-off."""
     if cutoff is None:
         return None

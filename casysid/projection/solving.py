@@ -63,12 +63,19 @@ def _is_good(local: Array | None, certificate: Certificate) -> bool:
 
 
 def _solve_locally(task: Task, certificate: Certificate | None, progress: Progress | None) -> tuple[Array | None, int]:
-    """IPOPT's best answer, None if it has none, and its iterations; the prior is the second start."""
+    """IPOPT's best answer, None if it has none, and its iterations.
+
+    It starts from the convex optimum, whose bound holds wherever a local answer comes from: from the clipped estimate a
+    robot of sixty links took thirty times as many iterations. The estimate and the prior are the next starts.
+    """
     objective = objective_of(task.misfit, task.frame, USUAL_WEIGHT) if certificate is None else certificate.objective
     goal = -math.inf if certificate is None else certificate.within(CLOSE)
     best: Array | None = None
     iterations = 0
-    for start in (task.start(objective, LIFT), task.lifted(task.frame.scaled_prior, LIFT)):
+    starts = [task.start(objective, LIFT), task.lifted(task.frame.scaled_prior, LIFT)]
+    if certificate is not None:
+        starts.insert(0, task.lifted(certificate.scaled, LIFT))
+    for start in starts:
         solution = _run_ipopt(task, objective, start, goal, progress)
         iterations += solution.iterations
         usable = solution.success if certificate is None else math.isfinite(solution.objective)

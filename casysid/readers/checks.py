@@ -9,10 +9,17 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.errors import RecordingError
 from casysid.readers.columns import Layout, listing
+from casysid.readers.statistics import FASTEST, Statistics
 from casysid.readers.table import Table
+from casysid.robot import JointKind, Robot
 
 FEWEST = 20
 """Fewer rows than this are no recording."""
+LARGEST = 1e9
+"""Of any value but time, in SI units: a wind turbine's shaft carries 1e7 N m, a spindle at FASTEST turns 1e9 rad in
+three hours."""
+LONGEST = 1e9
+"""From the first sample to the last [s]: thirty years."""
 
 
 class SampleChecks:
@@ -22,6 +29,7 @@ class SampleChecks:
         self._table, self._layout, self._source = table, layout, source
         self._samples = 0
         self._bad: dict[str, tuple[int, int, float]] = {}
+        self._far: dict[str, tuple[int, int, float]] = {}
         self._back = self._same = 0
         self._first_back: tuple[int, float, float] | None = None
         self._first_same: tuple[int, float] | None = None
@@ -32,7 +40,7 @@ class SampleChecks:
     @property
     def faulty(self) -> bool:
         """Whether figures of the samples would be meaningless."""
-        return bool(self._bad or self._back or self._same)
+        return bool(self._bad or self._far or self._back or self._same)
 
     def add(self, columns: Mapping[str, Array]) -> None:
         """Rows that follow those added before."""
@@ -43,6 +51,9 @@ class SampleChecks:
             self._add_finite(name, values)
         if self._layout.time is not None:
             self._add_order(columns[self._layout.time])
+        for name in self._layout.used:
+            if name != self._layout.time:
+                self._add_magnitude(name, columns[name])
         for name in (*self._layout.position, *self._layout.torque):
             self._low[name] = min(self._low.get(name, np.inf), float(columns[name].min()))
             self._high[name] = max(self._high.get(name, -np.inf), float(columns[name].max()))
@@ -54,6 +65,13 @@ class SampleChecks:
             first = int(np.argmin(finite))
             count, row, value = self._bad.get(name, (0, self._samples + first, float(values[first])))
             self._bad[name] = (count + int(np.count_nonzero(~finite)), row, value)
+
+    def _add_magnitude(self, name: str, values: Array) -> None:
+        if max(values.max(), -values.min()) > LARGEST:
+            far = np.flatnonzero(np.abs(values) > LARGEST)
+            first = int(far[0])
+            count, row, value = self._far.get(name, (0, self._samples + first, float(values[first])))
+            self._far[name] = (count + len(far), row, value)
 
     def _add_order(self, time: Array) -> None:
         joined = np.concatenate([self._last_time, time])
@@ -77,6 +95,7 @@ class SampleChecks:
         """
         self._check_count()
         self._check_finite()
+        self._check_magnitude()
         self._check_order()
         for word, names, means in (
             (
@@ -109,6 +128,14 @@ class SampleChecks:
                 "none is dropped or filled in silently"
             )
 
+    def _check_magnitude(self) -> None:
+        """A value that no machine has: a glitch, an overflow, or another unit."""
+        for name, (count, row, value) in self._far.items():
+            raise RecordingError(
+                f"{self._source}: '{name}' is {value:.6g} in {self._table.place(row)}, beyond {LARGEST:g}, "
+                f"which no machine reaches in SI units ({count} rows); cut out the glitch, or convert the column"
+            )
+
     def _check_order(self) -> None:
         name = self._layout.time
         if self._first_back is not None:
@@ -123,3 +150,45 @@ class SampleChecks:
                 f"{self._source}: '{name}' repeats the stamp before it in {self._same} rows, first in "
                 f"{self._table.place(row)} ({at:.9g}); remove the repeated rows, or write time with more digits"
             )
+
+
+def check_steps(table: Table, layout: Layout, statistics: Statistics) -> None:
+    """Refuse a position that leaps faster than any joint can move, and time that spans more than a life's work.
+
+    Raises:
+        RecordingError: Naming the first leap.
+    """
+    gaps, rows, label = statistics.steps.gaps, statistics.steps.gap_rows, statistics.label
+    span = statistics.steps.stop - statistics.steps.start
+    if span > LONGEST and len(gaps):
+        largest = int(np.argmax(gaps[:, 1] - gaps[:, 0]))
+        raise RecordingError(
+            f"{label}: time spans {span:.3g} s, its largest step before {table.place(int(rows[largest]))} "
+            f"({gaps[largest, 0]:.9g} then {gaps[largest, 1]:.9g}); wanted seconds of one recording, at most "
+            f"{LONGEST:g}"
+        )
+    leaps = statistics.positions(unwrapped=True)
+    for k in np.flatnonzero(leaps.leaps):
+        row, before, after, step = leaps.first_leap[k]
+        raise RecordingError(
+            f"{label}: '{layout.position[k]}' leaps from {before:.6g} to {after:.6g} in {step:.3g} s "
+            f"before {table.place(int(row))}, faster than {FASTEST:g} a second, which no joint is ({leaps.leaps[k]} "
+            "steps); cut out the glitch, or check the units of q and time"
+        )
+
+
+def check_quaternions(statistics: Statistics, robot: Robot) -> None:
+    """Refuse orientations whose quaternions are not of unit length within 1 %.
+
+    Raises:
+        RecordingError: Naming the joint.
+    """
+    for joint in robot.joints:
+        if joint.kind in (JointKind.SPHERICAL, JointKind.FREE_FLYER):
+            length, row = statistics.worst_quaternion[joint.name]
+            if abs(length - 1.0) > 0.01:
+                names = robot.channels[joint.channels][-4:]
+                raise RecordingError(
+                    f"{statistics.label}: the quaternion of '{joint.name}' ({listing(names)}) has length "
+                    f"{length:.4g} in sample {row + 1}, wanted 1; check which columns they are (w comes last)"
+                )

@@ -21,13 +21,19 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 from casysid.errors import RecordingError
 
 TIME = ("time", "Time", "t", "timestamp")
+MOST_COLUMNS = 10_000
+"""A table with more is no recording: 1000 joints (the most of any model here) of 10 quantities each."""
+LONGEST_NAME = 80
+"""Letters of a column's name that a message shows."""
+MOST_COMPARED = 1000
+"""Columns among which a misspelled one is looked for."""
 
 
 @dataclass(frozen=True)
@@ -127,12 +133,25 @@ def _by_name(quantity: Quantity, found: Sequence[str], names: Sequence[str], sou
 
 def _by_number(quantity: Quantity, found: Sequence[str], names: Sequence[str], source: str) -> tuple[str, ...] | None:
     for spelling, mark in product(quantity.numbered, ("", "_")):
-        pattern = re.compile(rf"{spelling}{mark}(\d+)")
-        hits = {int(m[1]): name for name in found if (m := pattern.fullmatch(name))}
+        pattern = re.compile(rf"{spelling}{mark}([0-9]{{1,9}})")
+        numbered = [(int(m[1]), name) for name in found if (m := pattern.fullmatch(name))]
+        hits = dict(numbered)
+        _refuse_same_number(quantity, numbered, hits, source)
         hits = hits or ({1: spelling} if spelling in found else {})
         if hits:
             return _in_order(quantity, hits, names, source)
     return None
+
+
+def _refuse_same_number(
+    quantity: Quantity, numbered: Sequence[tuple[int, str]], hits: Mapping[int, str], source: str
+) -> None:
+    for number, name in numbered:
+        if name != hits[number]:
+            raise RecordingError(
+                f"{source}: columns '{name}' and '{hits[number]}' are both number {number} of {quantity.word}; "
+                "rename or remove one of them"
+            )
 
 
 def _in_order(quantity: Quantity, hits: dict[int, str], names: Sequence[str], source: str) -> tuple[str, ...]:
@@ -163,8 +182,9 @@ def _refuse_unusable(layout: Layout, found: Sequence[str], source: str) -> None:
 
 def _lacking(quantity: Quantity, wanted: Sequence[str], found: Sequence[str], source: str) -> RecordingError:
     lacking = [name for name in wanted if name not in found]
-    free = [name for name in found if not _means_something(name, wanted)]
-    near = [match for name in lacking for match in difflib.get_close_matches(name, free, 1, 0.75)]
+    short = [name for name in found[:MOST_COMPARED] if len(name) <= LONGEST_NAME]
+    free = [name for name in short if not _means_something(name, wanted)]
+    near = [match for name in lacking[:8] for match in difflib.get_close_matches(name, free, 1, 0.75)]
     letter, number = quantity.named[0], quantity.numbered[0]
     return RecordingError(
         f"{source}: no column {listing(lacking)}{_maybe(near)}. Wanted for {quantity.word}: {listing(wanted)} "
@@ -192,6 +212,20 @@ def _maybe(near: Sequence[str]) -> str:
 
 
 def listing(names: Sequence[str], most: int = 16) -> str:
-    """Names for a message, the first ``most`` of them."""
+    """Names for a message, the first ``most`` of them, long ones cut short."""
     more = f", ... ({len(names)} in all)" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+    shown = (name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 3]}..." for name in names[:most])
+    return ", ".join(shown) + more
+
+
+def refuse_too_many(columns: int, source: str) -> None:
+    """Nothing, if a table of so many columns can be a recording.
+
+    Raises:
+        RecordingError: It cannot.
+    """
+    if columns > MOST_COLUMNS:
+        raise RecordingError(
+            f"{source}: {columns} columns, at most {MOST_COLUMNS} are read; rows are samples, so transpose a matrix "
+            "that has them as columns"
+        )

@@ -10,14 +10,16 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import RecordingError
-from casysid.readers.angles import check_quaternions, unwrap, unwrapped_sentences
-from casysid.readers.checks import SampleChecks
+from casysid.readers.angles import unwrap
+from casysid.readers.batches import all_rows
+from casysid.readers.checks import SampleChecks, check_quaternions, check_steps
 from casysid.readers.columns import Layout, match_columns
 from casysid.readers.statistics import Statistics
 from casysid.readers.table import Table, open_table
 from casysid.readers.units import check_units
 from casysid.readers.weaknesses import find_weaknesses
-from casysid.recording import BATCH, Recording, RecordingFile
+from casysid.recording.file import RecordingFile
+from casysid.recording.recording import Recording
 from casysid.robot import Robot
 from casysid.threads import single_threaded
 
@@ -29,20 +31,31 @@ def load_recording(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]
     Raises:
         RecordingError: If it cannot be used.
     """
+    try:
+        return _load(path, robot)
+    except MemoryError as error:
+        raise RecordingError(f"{path}: the recording does not fit into memory ({error}); cut it into pieces") from error
+
+
+def _load(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]]:
     table = open_table(path)
     layout = match_columns(table.names, robot.channels, robot.dofs, str(path))
-    columns = table.read(layout.used)
-    rows = len(columns[layout.torque[0]])
-    batches = (
-        {name: values[first : first + BATCH] for name, values in columns.items()} for first in range(0, rows, BATCH)
-    )
-    statistics = _scan(table, layout, robot, str(path), batches)
+    parts: list[dict[str, Array]] = []
+
+    def kept() -> Iterator[dict[str, Array]]:
+        for columns in table.batches(layout.used):
+            parts.append(columns)
+            yield columns
+
+    statistics = _scan(table, layout, robot, str(path), kept())
+    columns = all_rows(layout.used, parts)
     logged = _recording(columns, layout, robot, _about(path, table, layout))
     wrapped = _wrapped(statistics)
     recording = next(unwrap([logged], wrapped)) if wrapped else logged
-    return recording, (*unwrapped_sentences(statistics, robot), *find_weaknesses(statistics, robot))
+    return recording, find_weaknesses(statistics, robot)
 
 
+@single_threaded()
 def scan_recording(path: Path, robot: Robot) -> tuple[RecordingFile, tuple[str, ...]]:
     """The recording in a file, where it stays, and sentences about what is weak in it; reads the file once.
 
@@ -68,7 +81,7 @@ def scan_recording(path: Path, robot: Robot) -> tuple[RecordingFile, tuple[str, 
         sources=about["sources"],
         unused_columns=about["unused_columns"],
     )
-    return recording, (*unwrapped_sentences(statistics, robot), *find_weaknesses(statistics, robot))
+    return recording, find_weaknesses(statistics, robot)
 
 
 @dataclass(frozen=True)
@@ -92,6 +105,11 @@ class LogFile:
     channels: tuple[str, ...]
     dofs: tuple[str, ...]
     wrapped: tuple[int, ...]
+
+    @property
+    def seekable(self) -> bool:
+        """Whether samples far into the file are found without reading all before them."""
+        return self.table.seekable and not self.wrapped
 
     def read(self, first: int = 0, *, time_only: bool = False) -> Iterator[Recording]:
         """All samples from row ``first`` on, in consecutive batches.
@@ -142,6 +160,7 @@ def _scan(
     checks.finish()
     check_quaternions(statistics, robot)
     check_units(statistics, robot)
+    check_steps(table, layout, statistics)
     return statistics
 
 

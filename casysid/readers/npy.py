@@ -10,6 +10,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from casysid.archives import Unpackable
 from casysid.arrays import Array
 
 
@@ -18,6 +19,7 @@ class Member:
     """An array of one or two dimensions, open at some row.
 
     Attributes:
+        name: Of the array.
         streams: One that gives row after row; one for each column where the columns lie one after the other.
         kind: Of its numbers.
         rows: How many.
@@ -25,6 +27,7 @@ class Member:
         row: The next one.
     """
 
+    name: str
     streams: list[IO[bytes]]
     kind: np.dtype[Any]
     rows: int
@@ -35,8 +38,7 @@ class Member:
         """The next rows, fewer at the end, as float64.
 
         Raises:
-            ValueError: If the archive ends before.
-            TypeError: If they are no numbers.
+            Unpackable: If the array is damaged.
         """
         rows = min(rows, self.rows - self.row)
         self.row += rows
@@ -46,9 +48,12 @@ class Member:
         return np.stack([self._numbers(stream, rows) for stream in self.streams], axis=1)
 
     def _numbers(self, stream: IO[bytes], count: int) -> Array:
-        contents = stream.read(count * self.kind.itemsize)
+        try:
+            contents = stream.read(count * self.kind.itemsize)
+        except Exception as error:  # whatever the bytes of a stranger make a decoder raise means damage
+            raise Unpackable(f"array '{self.name}': {type(error).__name__}: {error}") from error
         if len(contents) < count * self.kind.itemsize:
-            raise ValueError("the array ends before its last row")
+            raise Unpackable(f"array '{self.name}' ends before its last row")
         return np.frombuffer(contents, dtype=self.kind).astype(np.float64, copy=False)
 
     def skip(self, rows: int) -> None:
@@ -61,28 +66,16 @@ class Member:
 
 @contextmanager
 def open_member(archive: zipfile.ZipFile, key: str) -> Iterator[Member]:
-    """The array of that name, at its first row.
-
-    Raises:
-        ValueError: If it holds Python objects, or is no array.
-    """
+    """The array of that name, at its first row; its header is known to be sound."""
     with ExitStack() as opened:
         stream = opened.enter_context(archive.open(f"{key}.npy"))
-        shape, columns_first, kind = read_header(stream)
-        if kind.hasobject:
-            raise ValueError("Object arrays cannot be loaded")
+        version = np.lib.format.read_magic(stream)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, columns_first, kind = read(stream)
         width = shape[1] if len(shape) == 2 else None
         streams = [stream]
-        for column in range(1, width or 1) if columns_first and len(shape) == 2 else ():
+        for column in range(1, width or 1) if columns_first else ():
             other = opened.enter_context(archive.open(f"{key}.npy"))
             other.seek(stream.tell() + column * shape[0] * kind.itemsize)
             streams.append(other)
-        yield Member(streams, kind, shape[0], width)
-
-
-def read_header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    """Shape, whether columns lie one after the other, and kind of the numbers that follow."""
-    version = np.lib.format.read_magic(stream)
-    if version == (1, 0):
-        return np.lib.format.read_array_header_1_0(stream)
-    return np.lib.format.read_array_header_2_0(stream)
+        yield Member(key, streams, kind, shape[0], width)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from casysid.archives import Unpackable, check_ratio
 from casysid.arrays import Array
 from casysid.errors import RecordingError
-from casysid.readers.table import from_row
+from casysid.readers.batches import from_row
 from casysid.recording.source import BATCH
 
 BUFFER = 1 << 18
@@ -29,16 +31,10 @@ class ParquetTable:
     path: Path
     names: tuple[str, ...]
 
-    def read(self, names: Sequence[str]) -> dict[str, Array]:
-        """The named columns; see :class:`~casysid.readers.table.Table`."""
-        import pyarrow as pa
-        from pyarrow import parquet
-
-        try:
-            table = parquet.ParquetFile(self.path).read(columns=list(names))
-        except (pa.ArrowException, OSError) as error:
-            raise self._damaged(error) from error
-        return {name: self._numbers(name, table.column(name)) for name in names}
+    @property
+    def seekable(self) -> bool:
+        """See :class:`~casysid.readers.table.Table`."""
+        return True
 
     def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
         """The named columns batch by batch; see :class:`~casysid.readers.table.Table`."""
@@ -46,36 +42,60 @@ class ParquetTable:
         from pyarrow import parquet
 
         try:
-            # pages are read as they are wanted; a group of rows may be as large as the file
+            # pages are read as they are wanted: a group of rows may be as large as the file
             with parquet.ParquetFile(self.path, buffer_size=BUFFER, pre_buffer=False) as file:
-                rows = [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)]
-                ends = np.cumsum(rows)
-                groups = np.flatnonzero(ends > first).tolist()
-                skipped = first - (int(ends[groups[0]]) - rows[groups[0]]) if groups else 0
+                for name in names:
+                    self._refuse_no_numbers(name, file.schema_arrow.field(name).type)
+                check_ratio(*_sizes(file.metadata, frozenset(names)))
+                groups, skipped = _groups_from(file.metadata, first)
                 read = file.iter_batches(BATCH, row_groups=groups, columns=list(names), use_threads=False)
-                yield from from_row(
-                    ({name: self._numbers(name, batch.column(name)) for name in names} for batch in read), skipped
-                )
-        except (pa.ArrowException, OSError) as error:
-            raise self._damaged(error) from error
+                yield from from_row((_numbers(batch, names) for batch in read), skipped)
+        except Unpackable as error:
+            raise RecordingError(f"{self.path}: {error}") from error
+        except (pa.ArrowException, OSError, KeyError, UnicodeDecodeError) as error:
+            raise self._damage(error) from error
 
     def place(self, row: int) -> str:
         """Row, counted from 1."""
         return f"row {row + 1} (the first is row 1)"
 
-    def _damaged(self, error: Exception) -> RecordingError:
-        return RecordingError(f"{self.path}: the Parquet file is damaged ({error}); copy or record it again")
-
-    def _numbers(self, name: str, column: object) -> Array:
+    def _refuse_no_numbers(self, name: str, kind: object) -> None:
         import pyarrow as pa
 
-        kind = column.type  # type: ignore[attr-defined]
         if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)):
             raise RecordingError(
-                f"{self.path}: column '{name}' holds {kind}, wanted numbers in SI units (time in seconds); "
+                f"{self.path}: column '{name}' holds {str(kind)[:80]}, wanted numbers in SI units (time in seconds); "
                 "convert the column and write the file again"
             )
-        return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False))  # type: ignore[attr-defined]
+
+    def _damage(self, error: Exception) -> RecordingError:
+        if isinstance(error, MemoryError):
+            return RecordingError(f"{self.path}: a column does not fit into memory ({error}); cut the recording")
+        return RecordingError(f"{self.path}: the Parquet file is damaged ({error}); copy or record it again")
+
+
+def _numbers(batch: Any, names: Sequence[str]) -> dict[str, Array]:
+    import pyarrow as pa
+
+    return {name: batch.column(name).cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False) for name in names}
+
+
+def _groups_from(metadata: Any, first: int) -> tuple[list[int], int]:
+    """The groups of rows with row ``first`` and those after it, and how many rows of theirs come before it."""
+    rows = [metadata.row_group(k).num_rows for k in range(metadata.num_row_groups)]
+    ends = np.cumsum(rows)
+    groups = np.flatnonzero(ends > first).tolist()
+    return groups, first - (int(ends[groups[0]]) - rows[groups[0]]) if groups else 0
+
+
+def _sizes(metadata: Any, names: frozenset[str]) -> tuple[int, int]:
+    """Bytes of some columns in the file, and as float64."""
+    packed = 0
+    for group in range(metadata.num_row_groups):
+        row_group = metadata.row_group(group)
+        chunks = (row_group.column(k) for k in range(row_group.num_columns))
+        packed += sum(max(chunk.total_compressed_size, 0) for chunk in chunks if chunk.path_in_schema in names)
+    return packed, 8 * metadata.num_rows * len(names)
 
 
 def open_parquet(path: Path) -> ParquetTable:
@@ -89,6 +109,10 @@ def open_parquet(path: Path) -> ParquetTable:
 
     try:
         names = parquet.ParquetFile(path).schema_arrow.names
-    except (pa.ArrowException, OSError) as error:
+    except UnicodeDecodeError as error:
+        raise RecordingError(
+            f"{path}: the name of a column is not UTF-8 text ({error}); rename it where the file is written"
+        ) from error
+    except (pa.ArrowException, OSError, KeyError) as error:
         raise RecordingError(f"{path}: not a Parquet file, or cut off ({error}); copy or record it again") from error
     return ParquetTable(path, tuple(names))

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from casysid.arrays import Array
 from casysid.readers.angles import RARELY, TURN, angle_joints, whole_turns
 from casysid.readers.steps import StepStatistics
-from casysid.recording import Facts, Recording
+from casysid.recording.file import Facts
+from casysid.recording.recording import Recording
 from casysid.recording.resolution import ResolutionScan
 from casysid.recording.spectrum import SpectrumScan
 from casysid.robot import Joint, JointKind, Robot
@@ -24,6 +25,8 @@ MOST_MARKS = 1 << 12
 """Rows whose sums are remembered: up to twice as many are, and then every second one is dropped."""
 JUMP = 10.0
 """A step faster than so many velocity limits is a jump."""
+FASTEST = 1e5
+"""Of a joint from one sample to the next [rad/s, m/s]: the fastest spindles turn at a million revolutions a minute."""
 SATURATED = 0.999
 """Of the effort limit."""
 
@@ -37,6 +40,8 @@ class Positions:
         fast: Steps faster than the joint's velocity limit, by channel.
         jumps: Steps faster than ten times that.
         first_jump: Time after the first of those [s].
+        leaps: Steps faster than any joint, by channel.
+        first_leap: Row after the first of those, positions before and after, and step of time [s], (channels, 4).
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -44,6 +49,7 @@ class Positions:
         self.low, self.high = np.full(channels, np.inf), np.full(channels, -np.inf)
         self.fast, self.jumps = np.zeros(channels, dtype=np.intp), np.zeros(channels, dtype=np.intp)
         self.first_jump = np.full(channels, np.nan)
+        self.leaps, self.first_leap = np.zeros(channels, dtype=np.intp), np.full((channels, 4), np.nan)
         limits = {
             joint.channels.start: float(robot.velocity_limit[joint.v.start])
             for joint in robot.joints
@@ -51,11 +57,14 @@ class Positions:
         }
         self._limited, self._limits = list(limits), np.array(list(limits.values()))
 
-    def add(self, position: Array, steps: Array, time: Array | None) -> None:
-        """Positions, and the steps between samples at ``time``, one more than the steps."""
+    def add(self, position: Array, steps: Array, time: Array | None, row: int = 0) -> None:
+        """Positions, and the steps to rows from ``row`` on, between samples at ``time``, one more than the steps."""
         self.low = np.minimum(self.low, position.min(axis=0))
         self.high = np.maximum(self.high, position.max(axis=0))
-        if time is None or not len(steps) or not self._limited:
+        if time is None or not len(steps):
+            return
+        self._find_leaps(position, steps, np.diff(time), row)
+        if not self._limited:
             return
         speed = np.abs(steps[:, self._limited]) / np.diff(time)[:, None]
         fast = speed > self._limits
@@ -68,6 +77,17 @@ class Positions:
             if not self.jumps[channel]:
                 self.first_jump[channel] = time[int(np.argmax(jumps[:, k])) + 1]
             self.jumps[channel] += int(jumps[:, k].sum())
+
+    def _find_leaps(self, position: Array, steps: Array, time: Array, row: int) -> None:
+        if np.abs(steps).max() <= FASTEST * time.min():
+            return
+        leaps = np.abs(steps) > FASTEST * time[:, None]
+        for channel in np.flatnonzero(leaps.any(axis=0)):
+            if not self.leaps[channel]:
+                k = int(np.argmax(leaps[:, channel]))
+                after = position[k + len(position) - len(steps), channel]
+                self.first_leap[channel] = (row + k, after - steps[k, channel], after, time[k])
+            self.leaps[channel] += int(np.count_nonzero(leaps[:, channel]))
 
 
 class Marks:
@@ -179,9 +199,10 @@ class Statistics:
         """As logged, and with whole turns taken out from when there is the first."""
         if turned.any() and self._straight is self._logged:
             self._straight = copy.deepcopy(self._logged)
-        self._logged.add(position, steps, time)
+        row = self.samples + len(position) - len(steps)
+        self._logged.add(position, steps, time, row)
         if self._straight is not self._logged:
-            self._straight.add(position - TURN * turned, steps - TURN * turns, time)
+            self._straight.add(position - TURN * turned, steps - TURN * turns, time, row)
         self.turns += np.count_nonzero(turns, axis=0)
         self._resolution.add(position)
 
@@ -206,8 +227,9 @@ class Statistics:
         if not unwrapped or self._straight is self._logged or not self.unwrapped.any():
             return self._logged
         mixed = copy.copy(self._logged)
-        for name in ("low", "high", "fast", "jumps", "first_jump"):
-            values = np.where(self.unwrapped, getattr(self._straight, name), getattr(self._logged, name))
+        for name in ("low", "high", "fast", "jumps", "first_jump", "leaps", "first_leap"):
+            straight, logged = getattr(self._straight, name), getattr(self._logged, name)
+            values = np.where(self.unwrapped.reshape(-1, *[1] * (logged.ndim - 1)), straight, logged)
             setattr(mixed, name, values)
         return mixed
 

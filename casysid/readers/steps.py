@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from casysid.arrays import Array
-from casysid.recording import GAP
+from casysid.recording.recording import GAP
 
 SAMPLE = 1 << 17
 """Quantiles are exact up to so many steps, and beyond from at least half as many drawn at random: the median's standard

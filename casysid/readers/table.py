@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Protocol
 
 from casysid.arrays import Array
 from casysid.errors import RecordingError
+from casysid.readers.columns import refuse_too_many
 
 TEXT_SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".txt", ".txt.gz")
 PARQUET_SUFFIXES = (".parquet", ".pq")
@@ -22,16 +23,15 @@ class Table(Protocol):
         """Column names in the file's order."""
         ...
 
-    def read(self, names: Sequence[str]) -> dict[str, Array]:
-        """The columns as float64, missing cells as nan, all of one length.
-
-        Raises:
-            RecordingError: If they cannot be read as numbers.
-        """
+    @property
+    def seekable(self) -> bool:
+        """Whether rows far into the file are found without reading all before them."""
         ...
 
     def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
-        """The same columns from row ``first`` (counted from 0) on, some ten thousand rows at a time.
+        """The columns as float64 from row ``first`` (counted from 0) on, some ten thousand rows at a time.
+
+        Missing cells are nan.
 
         Raises:
             RecordingError: If they cannot be read as numbers.
@@ -60,10 +60,11 @@ def open_table(path: Path) -> Table:
     from casysid.readers.parquet import open_parquet
     from casysid.readers.text import open_text
 
-    if not path.exists():
-        raise RecordingError(f"{path}: no such file; looked from {Path.cwd()}")
+    _refuse_no_file(path)
     if path.is_dir():
         raise RecordingError(f"{path}: is a directory; name the log files in it")
+    if not path.is_file():
+        raise RecordingError(f"{path}: is no regular file; copy what it gives to a file and name that")
     if path.stat().st_size == 0:
         raise RecordingError(f"{path}: the file is empty; record again or name another log")
     openers = (
@@ -72,18 +73,20 @@ def open_table(path: Path) -> Table:
     suffix = suffix_of(path)
     if suffix in openers:
         try:
-            return openers[suffix](path)
+            table = openers[suffix](path)
         except PermissionError as error:
             raise RecordingError(f"{path}: may not be read; change its permissions") from error
+        refuse_too_many(len(table.names), str(path))
+        return table
     raise RecordingError(
         f"{path}: '{suffix or path.name}' is no known kind of log; convert it to one of {', '.join(SUFFIXES)}"
     )
 
 
-def from_row(batches: Iterable[dict[str, Array]], first: int) -> Iterator[dict[str, Array]]:
-    """Batches without the rows before ``first``."""
-    for columns in batches:
-        rows = len(next(iter(columns.values())))
-        if first < rows:
-            yield {name: values[first:] for name, values in columns.items()} if first else columns
-        first = max(first - rows, 0)
+def _refuse_no_file(path: Path) -> None:
+    try:
+        there = path.exists()
+    except OSError as error:  # such as a name longer than the file system's
+        raise RecordingError(f"{path}: cannot be opened: {error.strerror}") from error
+    if not there:
+        raise RecordingError(f"{path}: no such file; looked from {Path.cwd()}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import gzip
+import io
 import re
 import zlib
 from collections.abc import Iterator, Sequence
@@ -11,17 +12,20 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, BinaryIO, TextIO
 
-import numpy as np
-
+from casysid.archives import GzipBytes, Unpackable
 from casysid.arrays import Array
 from casysid.errors import RecordingError
-from casysid.readers.table import from_row
+from casysid.readers.batches import from_row
 
 BLOCK = 1 << 22
-"""Bytes of text that are read at once: some ten thousand rows."""
+"""Bytes of text that Arrow reads at once: some ten thousand rows."""
+BUFFER = 1 << 20
 LONGEST_LINE = 1 << 20
+LONGEST_PREFACE = 1 << 20
+"""Characters of blank lines and comments before the header."""
+NO_LINES = "wanted one line a sample; were line ends lost?"
 NOT_TEXT = "is not text, though its suffix says so; is it a binary log, or another encoding than UTF-8?"
 
 
@@ -43,13 +47,10 @@ class TextTable:
     delimiter: str
     decimal: str
 
-    def read(self, names: Sequence[str]) -> dict[str, Array]:
-        """The named columns; see :class:`~casysid.readers.table.Table`."""
-        from pyarrow import csv as pa_csv
-
-        with self._as_arrow(names) as (stream, options):
-            table = pa_csv.read_csv(stream, *options)
-        return {name: np.asarray(table.column(str(self.names.index(name))).to_numpy()) for name in names}
+    @property
+    def seekable(self) -> bool:
+        """See :class:`~casysid.readers.table.Table`."""
+        return False
 
     def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
         """The named columns batch by batch; see :class:`~casysid.readers.table.Table`."""
@@ -92,23 +93,31 @@ class TextTable:
             ),
         )
         try:
-            with pa.input_stream(str(self.path), compression="gzip" if is_gzip(self.path) else None) as stream:
+            with open_bytes(self.path) as source, pa.PythonFile(source, mode="r") as stream:
                 yield stream, options
-        except (pa.ArrowInvalid, OSError) as error:
+        except Unpackable as error:
+            raise RecordingError(f"{self.path}: {error}") from error
+        except (pa.ArrowException, OSError, EOFError, zlib.error) as error:
             raise RecordingError(f"{self.path}: {self._fault(names) or error}") from error
 
     def place(self, row: int) -> str:
         """Line of the file, counted from 1 as an editor does, comments and blank lines included."""
         with open_lines(self.path) as lines:
-            line, _ = next(islice(self._rows(lines), row, None))
+            line, _ = next(islice(self._rows(lines), row, None), (self.header_line + 1 + row, []))
         return f"line {line} (the header is line {self.header_line})"
 
     def _rows(self, lines: TextIO) -> Iterator[tuple[int, list[str]]]:
         """Line number and cells of every row that is not blank."""
         for _ in range(self.header_line):
             lines.readline()
-        rows = csv.reader(lines, delimiter=self.delimiter)
+        rows = csv.reader(self._bounded(lines), delimiter=self.delimiter)
         yield from ((self.header_line + rows.line_num, cells) for cells in rows if cells)
+
+    def _bounded(self, lines: TextIO) -> Iterator[str]:
+        while line := lines.readline(LONGEST_LINE):
+            if len(line) == LONGEST_LINE:
+                raise RecordingError(f"{self.path}: a row is longer than {LONGEST_LINE} characters; {NO_LINES}")
+            yield line
 
     def _fault(self, names: Sequence[str]) -> str | None:
         """What is wrong with the first row that Arrow cannot have liked; None when every row looks right."""
@@ -137,11 +146,12 @@ def open_text(path: Path) -> TextTable:
     Raises:
         RecordingError: If the file is not text, is cut off, or has no header.
     """
-    comment, header, number = "", "", 0
+    comment, header, number, seen = "", "", 0, 0
     with open_lines(path) as lines:
         while not header:
             line = lines.readline(LONGEST_LINE)
-            if not line:
+            seen += len(line)
+            if not line or seen > LONGEST_PREFACE:
                 raise RecordingError(
                     f"{path}: no header line, only blank lines and comments; wanted names such as time,q1,tau1"
                 )
@@ -152,10 +162,10 @@ def open_text(path: Path) -> TextTable:
         raise RecordingError(f"{path}: {NOT_TEXT}")
     bare = re.sub('"[^"]*"', "", header)
     delimiter = max((mark for mark in ",;\t" if mark in bare), key=bare.count, default=" ")
-    names = _cells(header, delimiter)
+    names = _cells(header, delimiter, path)
     if all(is_number(name) for name in names):
-        names, number = _cells(comment.strip("#\r\n "), delimiter), number - 1
-        if len(names) != len(_cells(header, delimiter)):
+        names, number = _cells(comment.strip("#\r\n "), delimiter, path), number - 1
+        if len(names) != len(_cells(header, delimiter, path)):
             raise RecordingError(
                 f"{path}: line {number + 1} should name the columns, but holds numbers: '{header[:60]}'; "
                 "put a header line such as time,q1,q2,tau1,tau2 before the numbers"
@@ -164,8 +174,14 @@ def open_text(path: Path) -> TextTable:
     return TextTable(path, names, number, delimiter, decimal)
 
 
-def _cells(line: str, delimiter: str) -> tuple[str, ...]:
-    return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), ()))
+def _cells(line: str, delimiter: str, path: Path) -> tuple[str, ...]:
+    try:
+        return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), ()))
+    except csv.Error as error:
+        raise RecordingError(
+            f"{path}: the header cannot be cut into names of at most {csv.field_size_limit()} characters ({error}); "
+            f"is a quote left open? It begins '{line[:60]}'"
+        ) from error
 
 
 def is_gzip(path: Path) -> bool:
@@ -174,17 +190,23 @@ def is_gzip(path: Path) -> bool:
         return stream.read(2) == b"\x1f\x8b"
 
 
+def open_bytes(path: Path) -> BinaryIO:
+    """The bytes of the file, decompressed, as :class:`~casysid.archives.GzipBytes` does if they are gzip."""
+    return io.BufferedReader(GzipBytes(path), BUFFER) if is_gzip(path) else path.open("rb")
+
+
 @contextmanager
 def open_lines(path: Path) -> Iterator[TextIO]:
     """The text of the file, decompressed.
 
     Raises:
-        RecordingError: If the stream is broken off or is not text.
+        RecordingError: If the stream is broken off, is not text, or holds more than its bytes honestly can.
     """
     try:
-        opener = gzip.open if is_gzip(path) else open
-        with opener(path, "rt", encoding="utf-8-sig", newline="") as lines:
+        with io.TextIOWrapper(open_bytes(path), encoding="utf-8-sig", newline="") as lines:
             yield lines
+    except Unpackable as error:
+        raise RecordingError(f"{path}: {error}") from error
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise RecordingError(
             f"{path}: the gzip stream is broken or cut off ({error}); copy or record the file again"

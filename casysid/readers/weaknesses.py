@@ -20,6 +20,7 @@ STILL = 5e-3  # [rad, m]: less is friction's play or the encoder's last digits
 def find_weaknesses(log: Statistics, robot: Robot) -> tuple[str, ...]:
     """Sentences about what the data leave open or make doubtful; none when there is nothing to say."""
     searches = (
+        _wrapped_angles,
         _gaps,
         _jitter,
         _slow,
@@ -35,6 +36,18 @@ def find_weaknesses(log: Statistics, robot: Robot) -> tuple[str, ...]:
     return tuple(sentence for search in searches for sentence in search(log, robot))
 
 
+def _wrapped_angles(log: Statistics, robot: Robot) -> Iterator[str]:
+    """A sentence about wrapped angles, if there are any.
+
+    A joint at ``q`` and at ``q + 2π`` is in the same place, so taking the turns out changes no dynamics; left in, each
+    step would be a huge velocity.
+    """
+    places = [(joint.name, joint.channels.start) for joint in angle_joints(robot)]
+    wrapped = [f"{name} ({log.turns[k]} times)" for name, k in places if log.unwrapped[k]]
+    if wrapped:
+        yield f"angles jump by a whole turn: {listing(wrapped)}; taken as wrapped and unwrapped"
+
+
 def _gaps(log: Statistics, robot: Robot) -> Iterator[str]:
     gaps = log.steps.gaps
     if len(gaps):
@@ -43,7 +56,7 @@ def _gaps(log: Statistics, robot: Robot) -> Iterator[str]:
         yield (
             f"{len(gaps)} gaps in time, the largest {lengths[largest]:.4g} s "
             f"after {gaps[largest, 0]:.6g} s (the usual step is {log.steps.median:.4g} s); "
-            "the stretches between them are smoothed one by one"
+            "what one parts that is long beside the low-pass is smoothed piece by piece"
         )
 
 

@@ -4,31 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import BinaryIO, Literal
+from typing import IO, Literal
 
 import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import RecordingError
+from casysid.outputs import whole_file
 from casysid.readers.table import PARQUET_SUFFIXES, SUFFIXES, suffix_of
-from casysid.recording import Recording
-
-
-def columns_of(recording: Recording) -> dict[str, Array]:
-    """The recording's arrays as columns, named by the convention."""
-    columns = {} if recording.time is None else {"time": recording.time}
-    for letter, names, values in (
-        ("q", recording.channels, recording.position),
-        ("v", recording.dofs, recording.velocity),
-        ("a", recording.dofs, recording.acceleration),
-        ("tau", recording.dofs, recording.torque),
-    ):
-        if values is not None:
-            columns |= {f"{letter}_{name}": column for name, column in zip(names, values.T, strict=True)}
-    return columns
 
 
 def write_columns(path: Path, columns: Mapping[str, Array]) -> Path:
@@ -36,28 +21,24 @@ def write_columns(path: Path, columns: Mapping[str, Array]) -> Path:
 
     Raises:
         RecordingError: If the suffix is unknown.
+        OutputError: The file cannot be written.
     """
     suffix = suffix_of(path)
     if suffix not in SUFFIXES:
         raise RecordingError(f"{path}: cannot write a recording as '{suffix}'; use one of {', '.join(SUFFIXES)}")
     if not path.parent.is_dir():
         raise RecordingError(f"{path}: no directory {path.parent}; make it first")
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with partial.open("wb") as stream:
-            if suffix in PARQUET_SUFFIXES:
-                _write_parquet(stream, columns)
-            elif suffix == ".npz":
-                np.savez(stream, **columns)  # type: ignore[arg-type]
-            else:
-                _write_text(stream, columns, "\t" if ".tsv" in suffix else ",", compressed=suffix.endswith(".gz"))
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with whole_file(path) as stream:
+        if suffix in PARQUET_SUFFIXES:
+            _write_parquet(stream, columns)
+        elif suffix == ".npz":
+            np.savez(stream, **columns)  # type: ignore[arg-type]
+        else:
+            _write_text(stream, columns, "\t" if ".tsv" in suffix else ",", compressed=suffix.endswith(".gz"))
     return path
 
 
-def _write_text(stream: BinaryIO, columns: Mapping[str, Array], delimiter: str, *, compressed: bool) -> None:
+def _write_text(stream: IO[bytes], columns: Mapping[str, Array], delimiter: str, *, compressed: bool) -> None:
     import pyarrow as pa
     from pyarrow import csv as pa_csv
 
@@ -71,7 +52,7 @@ def _write_text(stream: BinaryIO, columns: Mapping[str, Array], delimiter: str, 
         pa_csv.write_csv(_table(columns), sink, options)
 
 
-def _write_parquet(stream: BinaryIO, columns: Mapping[str, Array]) -> None:
+def _write_parquet(stream: IO[bytes], columns: Mapping[str, Array]) -> None:
     from pyarrow import parquet
 
     parquet.write_table(_table(columns), stream)

@@ -12,13 +12,18 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.errors import RecordingError
 from casysid.recording.recording import GAP, Recording, joined
-from casysid.recording.source import BATCH, Source, Stretch, signs_of
+from casysid.recording.source import BATCH, EXCERPTS, Change, Source, Stretch, signs_of
 from casysid.recording.spectrum import PositionSpectrum
 from casysid.recording.summary import RecordingSummary
 
 
 class Log(Protocol):
     """Where the samples lie."""
+
+    @property
+    def seekable(self) -> bool:
+        """Whether samples far into the file are found without reading all before them."""
+        ...
 
     def read(self, first: int = 0, *, time_only: bool = False) -> Iterator[Recording]:
         """All samples from row ``first`` on, in consecutive batches.
@@ -93,6 +98,7 @@ class RecordingFile(Source):
         torque_delay: By how much the torque's time stamps are late against the positions' [s].
         time_scale: By which the file's time stamps are multiplied.
         flips: Columns whose signs are turned.
+        changes: What is made of the samples at last; rows are those of the file.
         sources: The file.
         unused_columns: Its columns that were left aside.
     """
@@ -108,6 +114,8 @@ class RecordingFile(Source):
     torque_delay: float = 0.0
     time_scale: float = 1.0
     flips: tuple[str, ...] = ()
+    changes: tuple[Change, ...] = ()
+    _known: dict[int, float] = field(default_factory=dict, init=False, repr=False)
     sources: tuple[str, ...] = ()
     unused_columns: tuple[str, ...] = field(default=(), repr=False)
 
@@ -184,7 +192,10 @@ class RecordingFile(Source):
         for batch in self.log.read(self.first):
             kept = min(len(batch), self.last - row)
             for first in range(0, kept, rows):
-                yield self._as_asked(batch.selected(slice(first, min(first + rows, kept))), signs)
+                part = self._as_asked(batch.selected(slice(first, min(first + rows, kept))), signs)
+                for change in self.changes:
+                    part = change(part, row + first)
+                yield part
             row += kept
             if row >= self.last:
                 return
@@ -218,24 +229,35 @@ class RecordingFile(Source):
             **changed,
         )
 
+    def excerpts(self, count: int = EXCERPTS, rows: int = BATCH // EXCERPTS) -> tuple[Recording, ...]:
+        """Short recordings in memory from ``count`` places evenly over this one; all of it if it is no longer."""
+        if self.log.seekable or len(self) <= count * rows:
+            return super().excerpts(count, rows)
+        found: list[list[Recording]] = [[] for _ in range(count)]
+        starts, first = np.linspace(0, len(self) - rows, count).astype(int), 0
+        for batch in self.batches():
+            for start, parts in zip(starts.tolist(), found, strict=True):
+                part = batch.selected(slice(max(start - first, 0), max(start + rows - first, 0)))
+                if len(part):
+                    parts.append(dataclasses.replace(part))
+            first += len(batch)
+        return tuple(joined(parts) for parts in found)
+
     def in_memory(self) -> Recording:
         """All samples at once."""
         return joined(list(self.batches()))
 
     def between(self, first: int, last: int) -> RecordingFile:
         """The samples from row ``first`` up to before row ``last``."""
-        known = {0: self.first_time, len(self) - 1: self.last_time}
-        ends = [
-            known[row] if row in known else self._time(row) if self.has_time else float("nan")
-            for row in (first, last - 1)
-        ]
+        ends = [self._time(row + self.first) if self.has_time else float("nan") for row in (first, last - 1)]
         return dataclasses.replace(
             self, first=self.first + first, last=self.first + last, first_time=ends[0], last_time=ends[1]
         )
 
     def _time(self, row: int) -> float:
-        """Of a row of this part, in the file's clock [s]."""
-        return float(next(self._times_from(row + self.first))[0])
+        """Of a row of the file, in the file's clock [s]."""
+        known = self._known | {self.first: self.first_time, self.last - 1: self.last_time}
+        return known[row] if row in known else float(next(self._times_from(row))[0])
 
     def _times_from(self, row: int) -> Iterator[Array]:
         """Time stamps from a row of the file on, batch by batch, in the file's clock [s]."""
@@ -256,6 +278,8 @@ class RecordingFile(Source):
         row = max(int(self.facts.mark_rows[mark]), self.first)
         for stamps in self._times_from(row):
             found = int(np.searchsorted(stamps * self.time_scale, time))
+            near = slice(max(found - 1, 0), found + 1)
+            self._known.update(zip(range(row, row + len(stamps))[near], stamps[near].tolist(), strict=True))
             if found < len(stamps):
                 return row + found - self.first
             row += len(stamps)
@@ -270,6 +294,10 @@ class RecordingFile(Source):
             time_scale=self.time_scale * scale,
             torque_delay=self.torque_delay * scale,
         )
+
+    def mapped(self, change: Change) -> RecordingFile:
+        """With other values of as many samples, whatever else is asked for done before; see :meth:`Source.mapped`."""
+        return dataclasses.replace(self, changes=(*self.changes, change))
 
     def with_torque_delay(self, delay: float) -> RecordingFile:
         """Told that its torques are so late [s] in all."""

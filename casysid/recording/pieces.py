@@ -34,8 +34,9 @@ def pieces(
 ) -> Iterator[Piece]:
     """Consecutive pieces, none over a gap, with samples beside the core on either side as far as the stretch has them.
 
-    These reach at least ``overlap`` seconds, and are at least as many as the source usually has in that time, so holes
-    that are no gaps count for nothing. In memory are no more than ``rows``, those beside them, and a batch.
+    These reach at least ``overlap`` seconds before the core's first sample and after the next core's first one, and
+    are at least as many as the source usually has in that time, so holes that are no gaps count for nothing. In memory
+    are no more than ``rows``, those beside them, and a batch.
 
     Args:
         source: With time.
@@ -99,16 +100,16 @@ class _Window:
 
     def after(self, row: int, overlap: float, fewest: int, stop: int) -> int:
         """The row up to before which there is enough from ``row`` on; no later than ``stop``."""
-        if not overlap:
+        if not overlap or row == stop:
             return row
-        until = min(row + fewest, stop)
+        until = min(row + max(fewest, 1), stop)
         self.keep(self._first, until)
-        moment = self._time(row - 1) + overlap
+        moment = self._time(row) + overlap
         while self._time(self._stop - 1) < moment and self._stop < stop:
             self._append()
-        times = self.rows(row, min(self._stop, stop)).time if row < stop else None
-        found = 0 if times is None else int(np.searchsorted(times, moment)) + 1
-        return max(until, min(row + found, stop))
+        times = self.rows(row, min(self._stop, stop)).time
+        assert times is not None
+        return max(until, min(row + int(np.searchsorted(times, moment)) + 1, stop))
 
     def _time(self, row: int) -> float:
         time = self.rows(row, row + 1).time

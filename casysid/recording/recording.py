@@ -21,7 +21,7 @@ import numpy.typing as npt
 from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError, RecordingError
 from casysid.recording.resolution import ResolutionScan
-from casysid.recording.source import BATCH, Source, Stretch, signs_of
+from casysid.recording.source import BATCH, Change, Source, Stretch, signs_of
 from casysid.recording.spectrum import PositionSpectrum, SpectrumScan
 from casysid.recording.summary import RecordingSummary
 
@@ -144,14 +144,6 @@ class Recording(Source):
         count, length = len(self._steps) - len(gaps), self.duration - float(gaps.sum())
         return count / length if count and length > 0.0 else float("nan")
 
-    @cached_property
-    def segments(self) -> tuple[slice, ...]:
-        """Runs of samples between the gaps in time; empty without time.
-
-        A gap is a step longer than five median steps.
-        """
-        return tuple(stretch.rows for stretch in self.stretches())
-
     def stretches(self, gap: float | None = None) -> tuple[Stretch, ...]:
         """The runs of samples between gaps in time; see :meth:`Source.stretches`."""
         if self.time is None:
@@ -220,6 +212,10 @@ class Recording(Source):
             return self
         return dataclasses.replace(self, time=self.time * scale, torque_delay=self.torque_delay * scale)
 
+    def mapped(self, change: Change) -> Recording:
+        """What ``change`` makes of the recording, from row 0."""
+        return change(self, 0)
+
     def with_torque_delay(self, delay: float) -> Recording:
         """The recording, told that its torques are so late [s] in all."""
         return self._with(torque_delay=delay)
@@ -268,6 +264,19 @@ class Recording(Source):
             unused_columns=self.unused_columns,
         )
 
+    def columns(self) -> dict[str, Array]:
+        """The arrays as columns, named by the convention."""
+        columns = {} if self.time is None else {"time": self.time}
+        for letter, names, values in (
+            ("q", self.channels, self.position),
+            ("v", self.dofs, self.velocity),
+            ("a", self.dofs, self.acceleration),
+            ("tau", self.dofs, self.torque),
+        ):
+            if values is not None:
+                columns |= {f"{letter}_{name}": column for name, column in zip(names, values.T, strict=True)}
+        return columns
+
     def write(self, path: str | Path) -> Path:
         """Write by suffix (.csv, .csv.gz, .tsv, .parquet, .npz), columns by name; read back, the numbers are the same.
 
@@ -277,9 +286,9 @@ class Recording(Source):
         Raises:
             RecordingError: If the suffix is none of these.
         """
-        from casysid.readers.writing import columns_of, write_columns
+        from casysid.readers.writing import write_columns
 
-        return write_columns(Path(path), columns_of(self))
+        return write_columns(Path(path), self.columns())
 
 
 def joined(parts: Sequence[Recording]) -> Recording:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
@@ -19,6 +20,9 @@ BATCH = 1 << 16
 """Rows of a batch: some megabytes, of which a step of work is large beside what Python adds to it."""
 EXCERPTS = 16
 """Excerpts of a long recording, by default."""
+
+
+Change = Callable[["Recording", int], "Recording"]
 
 
 class Stretch(NamedTuple):
@@ -107,6 +111,11 @@ class Source(ABC):
         """
 
     @property
+    def segments(self) -> tuple[slice, ...]:
+        """Rows of the runs of samples between steps of time longer than five median steps; empty without time."""
+        return tuple(stretch.rows for stretch in self.stretches())
+
+    @property
     @abstractmethod
     def spectrum(self) -> PositionSpectrum:
         """Averaged periodogram of the positions.
@@ -152,6 +161,10 @@ class Source(ABC):
         """With the time stamps multiplied; velocities and accelerations stay as logged."""
 
     @abstractmethod
+    def mapped(self, change: Change) -> Self:
+        """With other values of as many samples: ``change`` is given consecutive parts, and the row of their first."""
+
+    @abstractmethod
     def with_torque_delay(self, delay: float) -> Self:
         """Told that its torques are so late [s] in all."""
 
@@ -190,8 +203,9 @@ class Source(ABC):
         """Short recordings in memory from ``count`` places evenly over this one; all of it if it is no longer."""
         if len(self) <= count * rows:
             return tuple(self.batches(max(len(self), 1)))
-        starts = np.linspace(0, len(self) - rows, count).astype(int)
-        return tuple(next(iter(self.between(int(start), int(start) + rows).batches(rows))) for start in starts)
+        starts = np.linspace(0, len(self) - rows, count).astype(int).tolist()
+        parts = (next(self.between(start, start + rows).batches(rows)) for start in starts)
+        return tuple(dataclasses.replace(part) for part in parts)  # copies, where a part may be a view of a batch
 
 
 def signs_of(source: Source, columns: Sequence[str]) -> tuple[list[float], list[float], list[float]]:

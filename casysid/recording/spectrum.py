@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import rfft
-from scipy.signal import detrend, get_window
+from scipy.signal import get_window
 
 from casysid.arrays import Array, frozen
 
@@ -109,7 +109,7 @@ class SpectrumScan:
 
     def _average(self, segment: Array, weight: float) -> None:
         window = get_window("hann", len(segment))
-        lines = rfft(detrend(segment, axis=0, type="linear") * window[:, None], axis=0)
+        lines = rfft(_without_trend(segment) * window[:, None], axis=0)
         power = np.abs(lines) ** 2 * (2.0 * self._step / (window @ window))
         power[0] /= 2.0
         if len(segment) % 2 == 0:
@@ -137,3 +137,10 @@ class SpectrumScan:
             duration=duration,
             samples=samples,
         )
+
+
+def _without_trend(values: Array) -> Array:
+    """Values, shape (N, n), less the line of least squares through each column."""
+    number = np.arange(len(values)) - (len(values) - 1) / 2.0
+    slope = number @ values / max(float(number @ number), 1e-300)
+    return np.asarray(values - values.mean(axis=0) - number[:, None] * slope)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +9,10 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.excitation import ExcitationDesign, information_groups
-from casysid.excitation.output import expected_torque
-from casysid.report.pictures import MEASURED, PREDICTED, RESIDUAL, figure
+from casysid.excitation.output import expected_torque, identity_of
+from casysid.outputs import Stage, run_folder
+from casysid.report.labels import as_label
+from casysid.report.pictures import MEASURED, PREDICTED, RESIDUAL, figure, write_png
 from casysid.threads import single_threaded
 
 _POINTS = 1200
@@ -19,9 +20,18 @@ _POINTS = 1200
 
 @single_threaded()
 def write_excitation_pictures(design: ExcitationDesign, directory: str | Path) -> tuple[Path, ...]:
-    """Write pictures of joints, torque, distances (if any are kept), spectrum and information as PNG files."""
-    folder = Path(directory)
-    folder.mkdir(parents=True, exist_ok=True)
+    """Write pictures of joints, torque, distances (if any are kept), spectrum and information as PNG files.
+
+    Raises:
+        OutputError: They cannot be written, or the directory has pictures of another motion.
+    """
+    with run_folder(directory, identity_of(design), joining=True) as stage:
+        return add_excitation_pictures(design, stage)
+
+
+@single_threaded()
+def add_excitation_pictures(design: ExcitationDesign, stage: Stage) -> tuple[Path, ...]:
+    """Write the pictures to where a run's files wait; the paths that they will have."""
     pictures = {
         "joints.png": joint_figure(design),
         "torque.png": torque_figure(design),
@@ -32,10 +42,8 @@ def write_excitation_pictures(design: ExcitationDesign, directory: str | Path) -
     written = []
     for name, canvas in pictures.items():
         if canvas is not None:
-            partial = folder / f".{name}.{os.getpid()}.part"
-            canvas.savefig(partial, format="png", dpi=110)
-            os.replace(partial, folder / name)
-            written.append(folder / name)
+            write_png(canvas, stage.folder / name, dpi=110)
+            written.append(stage.home / name)
     return tuple(written)
 
 
@@ -51,7 +59,7 @@ def joint_figure(design: ExcitationDesign) -> Any:
         )
         ax.plot(time, motion.velocity[:, k] / limits.velocity[k], color=MEASURED, linewidth=0.9, label="velocity")
         _limits(ax, 1.0)
-        ax.set_ylabel(dof, fontsize=8)
+        ax.set_ylabel(as_label(dof), fontsize=8)
     axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=2, frameon=False, fontsize=8)
     axes[-1].set_xlabel("time [s], one period; shares of the limits")
     return canvas
@@ -67,7 +75,7 @@ def torque_figure(design: ExcitationDesign) -> Any:
         limit = problem.limits.torque[k]
         if np.isfinite(limit) and np.abs(torque[:, k]).max() > 0.4 * limit:
             _limits(ax, limit)
-        ax.set_ylabel(dof, fontsize=8)
+        ax.set_ylabel(as_label(dof), fontsize=8)
     axes[-1].set_xlabel("time [s], one period; torque [N m, N], limits drawn where they are near")
     return canvas
 
@@ -82,7 +90,7 @@ def distance_figure(design: ExcitationDesign) -> Any:
     values = block.measure(motion)
     canvas, (ax,) = figure(9.5, 3.2)
     for k in np.argsort(values.min(axis=0))[:6]:
-        ax.plot(time, values[:, k], linewidth=0.9, label=block.labels[k])
+        ax.plot(time, values[:, k], linewidth=0.9, label=as_label(block.labels[k]))
     ax.axhline(float(block.lower[0]), color=RESIDUAL, linewidth=1.0)
     ax.set_ylabel("distance [m]")
     ax.set_xlabel("time [s], one period")
@@ -98,7 +106,9 @@ def spectrum_figure(design: ExcitationDesign) -> Any:
     width = 0.8 / len(problem.robot.dofs)
     for k, dof in enumerate(problem.robot.dofs):
         amplitude = np.hypot(sine[k], cosine[k])
-        ax.bar(np.arange(1, problem.series.harmonics + 1) + (k + 0.5) * width - 0.4, amplitude, width, label=dof)
+        ax.bar(
+            np.arange(1, problem.series.harmonics + 1) + (k + 0.5) * width - 0.4, amplitude, width, label=as_label(dof)
+        )
     ax.set_xticks(range(1, problem.series.harmonics + 1), [f"{f:.3g}" for f in problem.series.frequencies])
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel("amplitude [rad, m]")
@@ -118,7 +128,7 @@ def information_figure(design: ExcitationDesign) -> Any:
         ax.scatter(before, place, color=MEASURED, s=16, label="before")
         ax.legend(frameon=False, fontsize=8)
     ax.set_xscale("log")
-    ax.set_yticks(place, [f"{group.owner} {group.kind}" for group in groups], fontsize=6)
+    ax.set_yticks(place, [f"{as_label(group.owner)} {group.kind}" for group in groups], fontsize=6)
     ax.set_xlabel("expected standard deviation (1: the torque noise, for a parameter in usual motion)")
     return canvas
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,9 @@ from casysid.arrays import Array
 from casysid.excitation import Box, ExcitationDesign, capsules_of
 from casysid.excitation.cartesian_blocks import ClearanceBlock
 from casysid.excitation.kinematics import Kinematics
-from casysid.report.pictures import figure_grid
+from casysid.excitation.output import identity_of
+from casysid.outputs import Stage, run_folder
+from casysid.report.pictures import figure_grid, write_png
 from casysid.simulation.drawing import draw_capsules
 
 INSTANTS = 8
@@ -24,6 +25,17 @@ def write_excitation_preview(design: ExcitationDesign, directory: str | Path) ->
 
     Raises:
         MissingExtraError: This machine cannot draw; the message says what it lacks.
+        OutputError: It cannot be written, or the directory has the preview of another motion.
+    """
+    with run_folder(directory, identity_of(design), joining=True) as stage:
+        return add_excitation_preview(design, stage)
+
+
+def add_excitation_preview(design: ExcitationDesign, stage: Stage) -> Path:
+    """Write ``preview.png`` to where a run's files wait; the path that it will have.
+
+    Raises:
+        MissingExtraError: This machine cannot draw; the message says what it lacks.
     """
     time = design.problem.series.grid(INSTANTS)
     pictures = _pictures(design, time)
@@ -32,12 +44,8 @@ def write_excitation_preview(design: ExcitationDesign, directory: str | Path) ->
         ax.imshow(picture)
         ax.set_axis_off()
         ax.set_title(f"{t:.2f} s", fontsize=8)
-    folder = Path(directory)
-    folder.mkdir(parents=True, exist_ok=True)
-    partial = folder / f".preview.png.{os.getpid()}.part"
-    canvas.savefig(partial, format="png", dpi=110)
-    os.replace(partial, folder / "preview.png")
-    return folder / "preview.png"
+    write_png(canvas, stage.folder / "preview.png", dpi=110)
+    return stage.home / "preview.png"
 
 
 def _pictures(design: ExcitationDesign, time: Array) -> npt.NDArray[np.uint8]:

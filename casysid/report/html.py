@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
 from casysid.identification import IdentificationResult
+from casysid.identification.output import identity_of
 from casysid.identification.verdict import judge
+from casysid.outputs import Stage, add_to_run, write_whole
 from casysid.report.pictures import inline_png, torque_figure
 from casysid.report.tables import (
     Table,
@@ -36,11 +37,18 @@ class Section:
 
 @single_threaded()
 def write_report(result: IdentificationResult, path: str | Path) -> None:
-    """Write ``report.html``, whole or not at all."""
-    path = Path(path)
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(render_report(result), encoding="utf-8")
-    os.replace(temporary, path)
+    """Write ``report.html``, whole or not at all; in the folder of :func:`~casysid.write_result` it joins its files.
+
+    Raises:
+        OutputError: It cannot be written, or the folder has a report of another result, which has replaced this one.
+    """
+    add_to_run(path, _bytes(result), identity_of(result))
+
+
+@single_threaded()
+def add_report(result: IdentificationResult, stage: Stage) -> None:
+    """Write ``report.html`` to where a run's files wait."""
+    write_whole(stage.folder / "report.html", _bytes(result))
 
 
 @single_threaded()
@@ -124,3 +132,7 @@ def _sections(result: IdentificationResult) -> list[Section]:
             ),
         )
     return sections
+
+
+def _bytes(result: IdentificationResult) -> bytes:
+    return render_report(result).encode(errors="backslashreplace")

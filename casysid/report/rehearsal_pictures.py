@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from casysid.report.pictures import MEASURED, MOST_POINTS, PREDICTED, RESIDUAL, figure
+from casysid.identification.output import identity_of
+from casysid.outputs import Stage, run_folder
+from casysid.report.labels import as_label
+from casysid.report.pictures import MEASURED, MOST_POINTS, PREDICTED, RESIDUAL, figure, write_png
 from casysid.report.tables import torque_unit
 from casysid.threads import single_threaded
 from casysid.validation import Rehearsal
@@ -22,23 +24,26 @@ SHOWN_SECONDS = 12.0
 
 @single_threaded()
 def write_rehearsal_pictures(rehearsal: Rehearsal, directory: str | Path) -> tuple[Path, ...]:
-    """Write ``torques.png``, ``tracking.png`` and ``parameters.png``, each whole or not at all; their paths."""
+    """Write ``torques.png``, ``tracking.png`` and ``parameters.png``, beside the rehearsal's other files; their paths.
+
+    Raises:
+        OutputError: They cannot be written, or the directory has pictures of another rehearsal.
+    """
+    with run_folder(directory, identity_of(rehearsal.result), joining=True) as stage:
+        return add_rehearsal_pictures(rehearsal, stage)
+
+
+@single_threaded()
+def add_rehearsal_pictures(rehearsal: Rehearsal, stage: Stage) -> tuple[Path, ...]:
+    """Write the pictures to where a run's files wait; the paths that they will have."""
     pictures = {
         "torques.png": rehearsed_torque_figure(rehearsal),
         "tracking.png": tracking_figure(rehearsal),
         "parameters.png": parameter_figure(rehearsal),
     }
-    folder = Path(directory)
-    folder.mkdir(parents=True, exist_ok=True)
-    return tuple(write_png(canvas, folder / name) for name, canvas in pictures.items())
-
-
-def write_png(canvas: Any, path: Path) -> Path:
-    """A figure as a PNG, through a temporary name; its path."""
-    temporary = path.with_name(path.name + ".part")
-    canvas.savefig(temporary, format="png", dpi=120)
-    os.replace(temporary, path)
-    return path
+    for name, canvas in pictures.items():
+        write_png(canvas, stage.folder / name, dpi=120)
+    return tuple(stage.home / name for name in pictures)
 
 
 def rehearsed_torque_figure(rehearsal: Rehearsal) -> Any:
@@ -55,7 +60,7 @@ def rehearsed_torque_figure(rehearsal: Rehearsal) -> Any:
         ax.plot(time, measured[shown, k], color=MEASURED, linewidth=2.2, label="measured")
         ax.plot(time, file[shown, k], color=RESIDUAL, linewidth=0.8, label="predicted by the model file")
         ax.plot(time, predicted[shown, k], color=PREDICTED, linewidth=1.0, label="predicted by identified parameters")
-        ax.set_ylabel(f"{dof}\n{torque_unit(result.robot, k)}", fontsize=8)
+        ax.set_ylabel(f"{as_label(dof)}\n{torque_unit(result.robot, k)}", fontsize=8)
     _legend(axes[0])
     axes[-1].set_xlabel("time [s], motion never fitted")
     return canvas
@@ -75,7 +80,7 @@ def tracking_figure(rehearsal: Rehearsal) -> Any:
         for k, ax in enumerate(axes):
             ax.plot(run.reference.time[shown], error[:, k], color=COLOURS[name], linewidth=1.0, label=label)
     for ax, dof in zip(axes, dofs, strict=True):
-        ax.set_ylabel(f"{dof}\nmrad, mm", fontsize=8)
+        ax.set_ylabel(f"{as_label(dof)}\nmrad, mm", fontsize=8)
     _legend(axes[0])
     axes[-1].set_xlabel("time [s], position error under computed torque")
     return canvas
@@ -102,7 +107,7 @@ def parameter_figure(rehearsal: Rehearsal) -> Any:
         linewidth=1.2,
         label="identified, with 95 % interval",
     )
-    ax.set_yticks(places, [_short(base.names[k]) for k in order], fontsize=7)
+    ax.set_yticks(places, [as_label(_short(base.names[k])) for k in order], fontsize=7)
     ax.set_xscale("symlog", linthresh=max(float(np.median(np.abs(before))), 1e-9))
     ax.set_xlabel("distance from the true value, as the RMS torque that it makes [N m]")
     _legend(ax)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from casysid.arrays import Array, frozen
 from casysid.errors import CasysidWarning, RobotError
 
+LARGEST_GRAVITY = 1000.0  # [m/s²]: the sun's surface has 274
 _RELATIVE_TOLERANCE = 1e-9  # of the inertia's trace: rounding, not physics
 
 
@@ -88,6 +89,16 @@ def check_gravity(gravity: npt.ArrayLike) -> Array:
         vector = frozen(gravity)
     except (TypeError, ValueError) as error:
         raise RobotError(f"gravity: wanted three numbers [m/s²], such as (0, 0, -9.81); got {gravity!r}") from error
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise RobotError(f"gravity: wanted three finite numbers [m/s²], such as (0, 0, -9.81); got {gravity!r}")
+    if vector.shape != (3,) or not (np.abs(vector) <= LARGEST_GRAVITY).all():
+        raise RobotError(
+            f"gravity: wanted three numbers of at most {LARGEST_GRAVITY:g} m/s², such as (0, 0, -9.81); got {gravity!r}"
+        )
     return vector
+
+
+def negative_friction(damping: float, friction: float, armature: float = 0.0) -> str:
+    """A complaint about a joint's friction and armature in the file, empty when none is negative."""
+    if min(damping, friction, armature) >= 0.0:
+        return ""
+    also = f", armature {armature:g}" if armature < 0.0 else ""
+    return f"negative friction (damping {damping:g}, friction {friction:g}{also}) is no usable prior"

@@ -10,6 +10,7 @@ from typing import Any
 import pinocchio as pin
 
 from casysid.errors import RobotError
+from casysid.robot.limits import LARGEST
 
 
 def lockable_values(
@@ -28,8 +29,10 @@ def lockable_values(
             position = float(value)
         except (TypeError, ValueError) as error:
             raise RobotError(f"{source}: locked joint '{name}': wanted a position [rad or m]; got {value!r}") from error
-        if not math.isfinite(position):
-            raise RobotError(f"{source}: locked joint '{name}': wanted a finite position [rad or m]; got {value!r}")
+        if not abs(position) <= LARGEST:
+            raise RobotError(
+                f"{source}: locked joint '{name}': wanted a finite position below {LARGEST:g} [rad or m]; got {value!r}"
+            )
         held.append((name, position))
     return tuple(held)
 

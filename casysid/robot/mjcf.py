@@ -15,12 +15,13 @@ import numpy.typing as npt
 from casysid.arrays import Array
 from casysid.errors import CasysidWarning, RobotError
 from casysid.robot.assembly import ROOT_JOINT, assemble_robot
-from casysid.robot.checks import InertiaFault, check_gravity, check_inertia, warn_of_faults
+from casysid.robot.checks import InertiaFault, check_gravity, check_inertia, negative_friction, warn_of_faults
+from casysid.robot.limits import check_expansion, check_numbers, check_parts
 from casysid.robot.locking import lock_joints, lockable_values
 from casysid.robot.mjcf_actuators import scalar_joint_of_actuator
 from casysid.robot.mjcf_tree import body_names, build_pin_model, find_free_root, joint_names
 from casysid.robot.model import Robot
-from casysid.robot.xmltext import parse_xml, read_bytes
+from casysid.robot.xmltext import Element, parse_xml, read_bytes
 
 
 def read_mjcf(
@@ -40,13 +41,18 @@ def read_mjcf(
     if root.tag != "mujoco":
         hint = "; this looks like URDF, use Robot.from_urdf" if root.tag == "robot" else ""
         raise RobotError(f"{path}: the root element is <{root.tag}>, an MJCF has <mujoco>{hint}")
+    _check_text(root, path)
     spec, compiled, messages = compile_mjcf(path)
+    _check_compiled(compiled, path)
     free_root = find_free_root(compiled, path) if floating_base else None
     held = lockable_values(locked, joint_names(compiled), path)
     locked_names = {name for name, _ in held}
     _refuse_loops(compiled, locked_names, path)
-    full = build_pin_model(compiled, free_root=free_root)
-    full.gravity.linear = _gravity(compiled) if gravity is None else check_gravity(gravity)
+    try:
+        full = build_pin_model(compiled, free_root=free_root)
+    except (ValueError, RuntimeError) as error:
+        raise RobotError(f"{path}: Pinocchio cannot build the model: {error}") from error
+    full.gravity.linear = check_gravity(_gravity(compiled) if gravity is None else gravity)
     model = lock_joints(full, held, path)
     carried = _carried_bodies(compiled, free_root, locked_names)
     links = [carried.get(str(name)) for name in list(model.names)[1:]]
@@ -64,8 +70,54 @@ def read_mjcf(
     for message in messages:
         warnings.warn(f"{path}: MuJoCo: {message}", CasysidWarning, stacklevel=stacklevel)
     _warn_of_extras(compiled, path, stacklevel=stacklevel)
+    _warn_of_negatives(robot, path, stacklevel=stacklevel)
     warn_of_faults(path, faults, stacklevel=stacklevel)
     return robot
+
+
+def _check_text(root: Element, path: Path) -> None:
+    """Nothing, if MuJoCo can be asked to compile the text.
+
+    Raises:
+        RobotError: Its parts are too many, or it is not UTF-8, as which MuJoCo reads it whatever it says.
+    """
+    check_expansion(root, path)
+    try:
+        read_bytes(path).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise RobotError(f"{path}: is not UTF-8 ({error}); save it as UTF-8") from error
+
+
+def _check_compiled(compiled: Any, path: Path) -> None:
+    """Nothing, if the model is of a size that is handled, in parts and in numbers.
+
+    Raises:
+        RobotError: Naming the body or joint.
+    """
+    check_parts(compiled.njnt, compiled.nbody - 1, path)
+    for b, name in enumerate(body_names(compiled)):
+        for word in ("mass", "inertia", "pos", "ipos"):
+            check_numbers(f"body '{name}': {word}", getattr(compiled, f"body_{word}")[b], path)
+    joints = joint_names(compiled)
+    for j, name in enumerate(joints):
+        check_numbers(f"joint '{name}': pos", compiled.jnt_pos[j], path)
+    for word in ("armature", "damping", "frictionloss"):
+        for i, value in enumerate(getattr(compiled, f"dof_{word}")):
+            check_numbers(f"joint '{joints[compiled.dof_jntid[i]]}': {word}", value, path)
+    check_numbers("the reference position of a joint", compiled.qpos0, path)
+
+
+def _warn_of_negatives(robot: Robot, path: Path, *, stacklevel: int) -> None:
+    """One :class:`CasysidWarning` that lists joints with negative friction or armature; silent when there are none."""
+    columns = (robot.damping, robot.dry_friction, robot.armature)
+    doubts = [
+        (joint.name, doubt)
+        for joint in robot.joints
+        if (doubt := negative_friction(*(float(column[joint.v].min()) for column in columns)))
+    ]
+    if doubts:
+        listing = "; ".join(f"joint '{name}': {doubt}" for name, doubt in doubts)
+        warnings.warn(f"{path}: {listing}", CasysidWarning, stacklevel=stacklevel + 1)
 
 
 def _gravity(compiled: Any) -> Array:
@@ -95,7 +147,7 @@ def compile_mjcf(path: Path) -> tuple[Any, Any, list[str]]:
         try:
             spec = _parse(path)
             compiled = spec.compile()
-        except ValueError as error:
+        except (ValueError, RuntimeError, MemoryError) as error:
             if "opening file" not in str(error):
                 raise _refusal(path, error) from error
             spec, compiled = _compile_without_files(path, error)
@@ -113,14 +165,14 @@ def _parse(path: Path) -> Any:
     return spec
 
 
-def _refusal(path: Path, error: ValueError, hint: str = "") -> RobotError:
+def _refusal(path: Path, error: Exception, hint: str = "") -> RobotError:
     reason = " ".join(str(error).split())
     if reason.startswith("XML Error") and "opening file" in reason and path.suffix != ".xml":
         hint += "; includes are found only from a file named .xml"
     return RobotError(f"{path}: MuJoCo does not accept the file: {reason}{hint}")
 
 
-def _compile_without_files(path: Path, error: ValueError) -> tuple[Any, Any]:
+def _compile_without_files(path: Path, error: Exception) -> tuple[Any, Any]:
     """Spec and model without geometry from files: bodies that state their inertia do not need it.
 
     Raises:
@@ -128,7 +180,7 @@ def _compile_without_files(path: Path, error: ValueError) -> tuple[Any, Any]:
     """
     try:
         spec = _parse(path)
-    except ValueError:
+    except (ValueError, RuntimeError, MemoryError):
         raise _refusal(path, error) from error
     ignored = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
     needed = []
@@ -144,7 +196,7 @@ def _compile_without_files(path: Path, error: ValueError) -> tuple[Any, Any]:
         spec.delete(asset)
     try:
         return spec, spec.compile()
-    except ValueError:
+    except (ValueError, RuntimeError, MemoryError):
         raise _refusal(path, error) from error
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from casysid.arrays import Array
 from casysid.errors import ParameterError, RobotError
 from casysid.robot.assembly import ROOT_JOINT, assemble_robot, inertia_from_parameters
 from casysid.robot.checks import FaultKind, InertiaFault, check_gravity, check_inertia, warn_of_faults
+from casysid.robot.limits import check_chain, check_parts
 from casysid.robot.locking import lock_joints, lockable_values
 from casysid.robot.lumping import joint_parts, sum_of
 from casysid.robot.model import Robot
@@ -81,16 +83,24 @@ def check_urdf_root(root: Element, path: Path) -> None:
         values = element.attributes.values()
         if element.tag.startswith("xacro:") or any("${" in text or "$(" in text for text in values):
             raise RobotError(
-                f"{path}:{element.line}: is a xacro file, not yet expanded; "
-                f"run `xacro {path.name} > {path.stem}.urdf` first"
+                f"{path}:{element.line}: is a xacro file, not yet expanded; run "
+                f"`xacro {shlex.quote(path.name)} > {shlex.quote(_free_name(path))}` first, and give that file"
             )
     if root.tag != "robot":
         hint = "; this looks like MJCF, use Robot.from_mjcf" if root.tag == "mujoco" else ""
         raise RobotError(f"{path}: the root element is <{root.tag}>, a URDF has <robot>{hint}")
 
 
+def _free_name(path: Path) -> str:
+    """Name for the expanded file beside a xacro file that no file has yet: the shell empties it before xacro reads."""
+    stem = path.name.removesuffix(".xacro").removesuffix(".urdf")
+    names = (f"{stem}{mark}.urdf" for mark in ("", "_expanded", *(f"_expanded{k}" for k in range(2, 1000))))
+    return next(name for name in names if not path.with_name(name).exists())
+
+
 def _find_base(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], path: Path) -> str:
     """The one link that no joint carries."""
+    check_parts(sum(joint.kind != "fixed" for joint in joints.values()), len(links), path)
     if not links:
         raise RobotError(f"{path}: has no <link>")
     carrier: dict[str, UrdfJoint] = {}
@@ -110,11 +120,15 @@ def _find_base(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], p
         raise RobotError(
             f"{path}: links {', '.join(bases)} have no parent; exactly one link may be the base of the tree"
         )
-    reached, waiting = set(bases), list(bases)
+    carried: dict[str, list[str]] = {}
+    for joint in joints.values():
+        carried.setdefault(joint.parent, []).append(joint.child)
+    reached, waiting = set(bases), [(link, 0) for link in bases]
     while waiting:
-        link = waiting.pop()
-        waiting += [joint.child for joint in joints.values() if joint.parent == link]
-        reached.update(waiting)
+        link, depth = waiting.pop()
+        check_chain(depth, link, path)
+        waiting += [(child, depth + 1) for child in carried.get(link, ())]
+        reached.add(link)
     if reached != set(links):
         loop = ", ".join(sorted(set(links) - reached))
         raise RobotError(f"{path}: links {loop} form a loop that no base carries; a URDF must be a tree")

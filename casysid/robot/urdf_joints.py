@@ -12,10 +12,13 @@ import numpy as np
 
 from casysid.arrays import Array, frozen
 from casysid.errors import CasysidWarning, RobotError
+from casysid.robot.checks import negative_friction
+from casysid.robot.limits import LARGEST
 from casysid.robot.urdf_links import read_number, read_vector
 from casysid.robot.xmltext import Element
 
 _ONE_DOF = ("revolute", "continuous", "prismatic")
+_SHORTEST_AXIS = 1e-9  # a unit vector's rounding is 1e-16
 _KINDS = (*_ONE_DOF, "fixed", "floating", "planar")
 
 
@@ -97,8 +100,8 @@ class _JointReader:
         kind = self._kind()
         lower, upper, velocity, effort = self._limits(kind)
         damping, friction = self._number("dynamics", "damping", 0.0), self._number("dynamics", "friction", 0.0)
-        if min(damping, friction) < 0.0:
-            self._doubts.append(f"negative friction (damping {damping:g}, friction {friction:g}) is no usable prior")
+        if doubt := negative_friction(damping, friction):
+            self._doubts.append(doubt)
         mimic = self._element.find("mimic")
         return UrdfJoint(
             name=self._element.name,
@@ -144,32 +147,34 @@ class _JointReader:
         try:
             return read_vector(text, 3)
         except ValueError:
-            raise self._fail(f'<{tag} {key}="{text}"> is not three finite numbers') from None
+            raise self._fail(f'<{tag} {key}="{text}"> is not three finite numbers below {LARGEST:g}') from None
 
-    def _number(self, tag: str, key: str, default: float) -> float:
+    def _number(self, tag: str, key: str, default: float, largest: float = LARGEST) -> float:
         text = self._attributes(tag).get(key)
         if text is None:
             return default
         try:
-            return read_number(text)
+            return read_number(text, largest)
         except ValueError:
-            raise self._fail(f'<{tag} {key}="{text}"> is not a finite number') from None
+            bound = f"finite number below {largest:g}" if math.isfinite(largest) else "finite number"
+            raise self._fail(f'<{tag} {key}="{text}"> is not a {bound}') from None
 
     def _axis(self, kind: str) -> Array:
         axis = self._vector("axis", "xyz", "1 0 0")
         if kind == "planar" and not np.array_equal(axis, [0.0, 0.0, 1.0]):
             raise self._fail('a planar joint moves in the x-y plane here: wanted <axis xyz="0 0 1"/>; turn its origin')
         length = float(np.linalg.norm(axis))
-        if kind in _ONE_DOF and length == 0.0:
-            raise self._fail('<axis xyz="0 0 0"> has no direction')
+        if kind in _ONE_DOF and length < _SHORTEST_AXIS:
+            raise self._fail(f'<axis xyz="{axis[0]:g} {axis[1]:g} {axis[2]:g}"> has no direction')
         return frozen(axis / length) if length and abs(length - 1.0) > 1e-15 else axis
 
     def _limits(self, kind: str) -> tuple[float, float, float, float]:
         """Lower, upper, velocity, effort; what is absent or plain zero is taken as no limit."""
         if kind not in _ONE_DOF:
             return -math.inf, math.inf, math.inf, math.inf
-        lower, upper = self._number("limit", "lower", 0.0), self._number("limit", "upper", 0.0)
-        velocity, effort = self._number("limit", "velocity", 0.0), self._number("limit", "effort", 0.0)
+        lower, upper, velocity, effort = (
+            self._number("limit", key, 0.0, math.inf) for key in ("lower", "upper", "velocity", "effort")
+        )
         if lower > upper:
             raise self._fail(f"lower limit {lower:g} exceeds upper limit {upper:g}")
         if min(velocity, effort) < 0.0:

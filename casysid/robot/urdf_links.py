@@ -16,6 +16,7 @@ from casysid.arrays import Array, frozen
 from casysid.errors import RobotError
 from casysid.inertia import inertial_parameters
 from casysid.robot.checks import FaultKind, InertiaFault, check_inertia
+from casysid.robot.limits import LARGEST
 from casysid.robot.xmltext import Element
 
 _ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -51,14 +52,14 @@ class UrdfLink:
         return inertial_parameters(self.mass, self.com, R @ full_inertia(self.inertia) @ R.T)
 
 
-def read_number(text: str) -> float:
-    """A finite number.
+def read_number(text: str, largest: float = LARGEST) -> float:
+    """A finite number, no larger than ``largest`` either way.
 
     Raises:
         ValueError: The text is no such thing.
     """
     number = float(text)
-    if not math.isfinite(number) or "_" in text:
+    if not abs(number) <= largest or math.isinf(number) or "_" in text:
         raise ValueError(text)
     return number
 
@@ -121,7 +122,9 @@ def _read_mass(inertial: Element, unreadable: list[str]) -> float:
     try:
         return read_number(text)
     except ValueError:
-        unreadable.append(f'mass value="{text}" is not a finite number' if text else "<inertial> has no mass value")
+        unreadable.append(
+            f'mass value="{text}" is not a finite number below {LARGEST:g}' if text else "<inertial> has no mass value"
+        )
         return 0.0
 
 
@@ -133,7 +136,9 @@ def _read_origin(inertial: Element, unreadable: list[str]) -> tuple[Array, Array
         try:
             vectors[key] = read_vector(attributes.get(key, "0 0 0"), 3)
         except ValueError:
-            unreadable.append(f'inertial origin {key}="{attributes[key]}" is not three finite numbers')
+            unreadable.append(
+                f'inertial origin {key}="{attributes[key]}" is not three finite numbers below {LARGEST:g}'
+            )
             vectors[key] = frozen(np.zeros(3))
     return vectors["xyz"], vectors["rpy"]
 
@@ -147,5 +152,7 @@ def _read_inertia(inertial: Element, unreadable: list[str]) -> Array:
         try:
             entries[k] = read_number(text)
         except ValueError:
-            unreadable.append(f'{key}="{text}" is not a finite number' if text else f"{key} is missing")
+            unreadable.append(
+                f'{key}="{text}" is not a finite number below {LARGEST:g}' if text else f"{key} is missing"
+            )
     return entries

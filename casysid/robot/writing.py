@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy.typing as npt
 from casysid.arrays import Array
 from casysid.errors import RobotError
 from casysid.inertia import mass_properties
+from casysid.outputs import whole_file
 from casysid.robot.lumping import is_body
 from casysid.robot.model import Joint, JointKind, Robot
 from casysid.robot.reading import read_robot
@@ -41,6 +41,7 @@ def write_robot(
     damping: npt.ArrayLike | None = None,
     dry_friction: npt.ArrayLike | None = None,
     armature: npt.ArrayLike | None = None,
+    keep_as: str | Path | None = None,
 ) -> WrittenModel:
     """Writes the robot's file with other parameters; everything else in it stays.
 
@@ -55,10 +56,12 @@ def write_robot(
         damping: Shape (nv,); None keeps the robot's.
         dry_friction: Shape (nv,); None keeps the robot's.
         armature: Shape (nv,); None keeps the robot's.
+        keep_as: Put the file there instead, once it has been read back at its place: it waits for the rest of a run.
 
     Raises:
         ParameterError: A parameter vector does not fit.
-        RobotError: The file cannot be written, or does not read back as the same robot; nothing is left behind then.
+        RobotError: The file does not read back as the same robot; nothing is left behind then.
+        OutputError: The file cannot be written; nothing is left behind then.
     """
     path = Path(path)
     wanted = robot.with_parameters(
@@ -74,16 +77,11 @@ def write_robot(
         for link, theta in zip(wanted.links, wanted.inertial_parameters.reshape(-1, 10), strict=True)
         if not is_body(mass_properties(theta))
     ]
-    draft = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
-        draft.write_bytes(text)
+    with whole_file(path, keep_as=keep_as) as stream:
+        stream.write(text)
+        stream.flush()
         if robot.source_format == "urdf" or not impossible:
-            _check_same(wanted, _read_back(wanted, draft), path)
-        os.replace(draft, path)
-    except OSError as error:
-        raise RobotError(f"{path}: cannot be written: {error.strerror}") from error
-    finally:
-        draft.unlink(missing_ok=True)
+            _check_same(wanted, _read_back(wanted, Path(stream.name)), path)
     return WrittenModel(path, (*notes, *impossible))
 
 

@@ -10,6 +10,12 @@ from xml.parsers import expat
 
 from casysid.errors import RobotError
 
+LARGEST_FILE = 1 << 26
+"""Bytes: half a kilobyte for each of as many elements as are read."""
+MOST_ELEMENTS = 100_000
+"""Of one file: a mobile manipulator's URDF has five hundred (TIAGo)."""
+DEEPEST = 500
+"""Elements within each other: MuJoCo's own reader (TinyXML-2) allows no more."""
 _START_TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=>]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*/?>""")
 
 
@@ -52,9 +58,11 @@ class Element:
 
     def walk(self) -> Iterator[Element]:
         """This element and everything below it, in the order of the text."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
+        waiting = [self]
+        while waiting:
+            element = waiting.pop()
+            yield element
+            waiting += reversed(element.children)
 
 
 def read_bytes(path: Path) -> bytes:
@@ -63,11 +71,15 @@ def read_bytes(path: Path) -> bytes:
     Raises:
         RobotError: It is not there, or is no readable file.
     """
-    if not path.exists():
-        raise RobotError(f"{path}: no such file (looked in {path.parent.resolve()})")
-    if path.is_dir():
-        raise RobotError(f"{path}: is a folder; give the URDF or MJCF file in it")
     try:
+        if not path.exists():
+            raise RobotError(f"{path}: no such file (looked in {path.parent.resolve()})")
+        if path.is_dir():
+            raise RobotError(f"{path}: is a folder; give the URDF or MJCF file in it")
+        if not path.is_file():
+            raise RobotError(f"{path}: is no regular file; copy what it gives to a file and name that")
+        if path.stat().st_size > LARGEST_FILE:
+            raise RobotError(f"{path}: {path.stat().st_size} bytes; a model file has at most {LARGEST_FILE}")
         return path.read_bytes()
     except OSError as error:
         raise RobotError(f"{path}: cannot be read: {error.strerror}") from error
@@ -86,11 +98,20 @@ def parse_xml(text: bytes, path: Path) -> Element:
     top = Element("", {}, 0, 0, 0)
     stack = [top]
 
+    count = 0
+
     def begin(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
+        where = f"{path}:{parser.CurrentLineNumber}"
+        if count > MOST_ELEMENTS:
+            raise RobotError(f"{where}: more than {MOST_ELEMENTS} elements, too many for a model of a robot")
+        if len(stack) > DEEPEST:
+            raise RobotError(f"{where}: <{tag}> is more than {DEEPEST} elements deep, too deep for a model of a robot")
         start = parser.CurrentByteIndex
         match = _START_TAG.match(text, start)
         if match is None:
-            raise RobotError(f"{path}:{parser.CurrentLineNumber}: cannot read the tag <{tag}>")
+            raise RobotError(f"{where}: cannot read the tag <{tag}>")
         element = Element(tag, attributes, parser.CurrentLineNumber, start, match.end(), parent=stack[-1])
         stack[-1].children.append(element)
         stack.append(element)
@@ -105,8 +126,12 @@ def parse_xml(text: bytes, path: Path) -> Element:
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        reason = expat.errors.messages[error.code]
+        reason = expat.ErrorString(error.code)
         raise RobotError(f"{path}:{error.lineno}: not well-formed XML ({reason}, column {error.offset + 1})") from error
+    except (LookupError, ValueError) as error:
+        if isinstance(error, RobotError):
+            raise
+        raise RobotError(f"{path}: is in an encoding that is not read ({error}); save it as UTF-8") from error
     root = top.children[0]
     root.parent = None
     return root

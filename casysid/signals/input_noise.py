@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError
-from casysid.recording import Recording
-from casysid.recording.resolution import position_resolution
-from casysid.signals.noise import noise_level_error, position_noise
+from casysid.recording import Recording, Source
+from casysid.signals.noise import noise_level_error, noise_of
 from casysid.threads import single_threaded
 
+BLOCK = 1 << 12
+"""Rows whose noise is drawn from one seed."""
 GIVEN, SPECTRUM = "given", "spectrum of the positions"
+
+Disturbed = TypeVar("Disturbed", bound=Source)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,19 +66,46 @@ class InputNoise:
         for name in ("position", "velocity", "acceleration", "resolution"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
-    def disturb(self, recording: Recording, scale: float, seed: int) -> Recording:
+    def disturb(self, recording: Disturbed, scale: float, seed: int) -> Disturbed:
         """The recording with ``scale`` times this noise added, drawn anew from the seed."""
-        rng = np.random.default_rng(seed)
+        return recording.mapped(Disturbance(self, scale, seed))
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbance:
+    """Adds noise to consecutive parts of a recording: to a row the same, however the recording is cut into parts.
+
+    Attributes:
+        noise: Its standard deviations.
+        scale: Times which it is added.
+        seed: Of the draws.
+    """
+
+    noise: InputNoise
+    scale: float
+    seed: int
+
+    def __call__(self, recording: Recording, row: int) -> Recording:
+        """The part whose first row is number ``row`` of the recording, noisier."""
         changed = {}
-        for name in ("position", "velocity", "acceleration"):
-            values, std = getattr(recording, name), getattr(self, name)
+        for k, name in enumerate(("position", "velocity", "acceleration")):
+            values, std = getattr(recording, name), getattr(self.noise, name)
             if values is not None and std.any():
-                changed[name] = values + scale * std * rng.normal(size=values.shape)
+                changed[name] = values + self.scale * std * self._draws(k, row, values.shape)
         return dataclasses.replace(recording, **changed)
+
+    def _draws(self, quantity: int, row: int, shape: tuple[int, int]) -> Array:
+        """Standard normal draws for some rows; those of a block of rows come from one seed of their own."""
+        first, last = row // BLOCK, -(-(row + shape[0]) // BLOCK)
+        blocks = [
+            np.random.default_rng((self.seed, quantity, block)).normal(size=(BLOCK, shape[1]))
+            for block in range(first, last)
+        ]
+        return np.concatenate(blocks)[row - first * BLOCK :][: shape[0]]
 
 
 @single_threaded()
-def find_input_noise(recording: Recording, levels: NoiseLevels, *, as_logged: bool) -> InputNoise | None:
+def find_input_noise(recording: Source, levels: NoiseLevels, *, as_logged: bool) -> InputNoise | None:
     """The noise of a recording's motion as far as given, else as found in its positions; None if neither is possible.
 
     Args:
@@ -87,7 +118,7 @@ def find_input_noise(recording: Recording, levels: NoiseLevels, *, as_logged: bo
         ParameterError: As many levels as there are channels or degrees of freedom are wanted, and there are others.
     """
     channels, dofs = len(recording.channels), len(recording.dofs)
-    resolution = position_resolution(recording.position) if recording.time is not None else np.zeros(channels)
+    resolution = recording.spectrum.resolution if recording.has_time else np.zeros(channels)
     if as_logged:
         given = (levels.position, levels.velocity, levels.acceleration)
         if not any(np.any(level) for level in given if level is not None):
@@ -100,12 +131,9 @@ def find_input_noise(recording: Recording, levels: NoiseLevels, *, as_logged: bo
             relative_error=0.0,
             source=GIVEN,
         )
-    assert recording.time is not None
     found = levels.position is None
     return InputNoise(
-        position=position_noise(recording.time, recording.position)
-        if found
-        else _spread(levels.position, channels, "position"),
+        position=noise_of(recording.spectrum) if found else _spread(levels.position, channels, "position"),
         velocity=np.zeros(dofs),
         acceleration=np.zeros(dofs),
         resolution=resolution,

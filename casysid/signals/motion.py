@@ -70,10 +70,12 @@ class Motion:
 
     def without_ends(self) -> Motion:
         """The settled samples only."""
-        if self.settled.all():
-            return self
+        return self if self.settled.all() else self.rows(self.settled)
+
+    def rows(self, chosen: slice | npt.NDArray[np.bool_]) -> Motion:
+        """Some samples only, in the order of time."""
         kept = ("time", "q", "v", "a", "tau", "standing", "settled")
-        return dataclasses.replace(self, **{name: getattr(self, name)[self.settled] for name in kept})
+        return dataclasses.replace(self, **{name: getattr(self, name)[chosen] for name in kept})
 
     def decimated(self, stride: int) -> Motion:
         """Torque averaged over ``stride`` samples, the motion at their middle: for rates far above the low-pass.
@@ -275,7 +277,7 @@ class _MotionMaker:
         own = self._own_time(piece, time)
         wanted = slice(
             int(np.searchsorted(time, time[core.start] - window)),
-            int(np.searchsorted(time, time[core.stop - 1] + window, side="right")),
+            int(np.searchsorted(time, min(own[1], time[-1]) + window, side="right")),
         )
         within = self._within(time, stretch)
         rows = np.arange(wanted.start, wanted.stop)

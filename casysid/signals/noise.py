@@ -26,6 +26,7 @@ LOWEST_LINES = 10.0
 """Lowest candidate for the smoothing, in lines of the spectrum."""
 
 
+@single_threaded()
 def spectrum_of(time: Array, position: Array) -> PositionSpectrum:
     """Averaged periodogram of positions, shape (N, n), at increasing times [s]."""
     scan, resolution = SpectrumScan(), ResolutionScan()
@@ -45,11 +46,13 @@ def motion_band(time: Array, position: Array, share: float = 0.99) -> Array:
     return band_of(spectrum_of(time, position), share)
 
 
+@single_threaded()
 def position_noise(time: Array, position: Array) -> Array:
     """:func:`noise_of` positions, shape (N, n), at increasing times [s]."""
     return noise_of(spectrum_of(time, position))
 
 
+@single_threaded()
 def smoothing_cutoff(time: Array, position: Array, usual: float = np.inf) -> float:
     """:func:`cutoff_of` positions, shape (N, n), at increasing times [s]."""
     return cutoff_of(spectrum_of(time, position), usual)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from casysid.dynamics import FrictionModel
 from casysid.errors import ParameterError
 from casysid.identification.friction_model import model_from_json
+from casysid.validation.earlier_json import check_numbers, number, numbers_by_name, object_at, read_json, texts
 
+SMALLEST_GAIN = 1e-6
+"""Of torque: as from N m to mega-newton metres."""
+LOWEST_CUTOFF, HIGHEST_CUTOFF = 0.01, 1e4
+"""As on the command line [Hz]."""
 Drives = Mapping[str, Mapping[str, float | None]]
 """Friction and armature by joint and kind, as in a ``result.json``."""
 
@@ -48,21 +53,42 @@ def read_earlier_result(path: str | Path) -> EarlierResult:
         ParameterError: The file is not such a result, or its columns of friction are not casysid's own.
     """
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-        clock = content.get("time_base", {})
+        content = read_json(Path(path))
+        clock = object_at(content, "time_base")
+        check_numbers(object_at(content, "friction_model"), "friction_model")
         return EarlierResult(
-            drives=content["friction"],
+            drives=_drives(content),
             friction=model_from_json(content["friction_model"]) if "friction_model" in content else None,
-            cutoff=content["cutoff"]["hz"],
-            delays={str(joint): float(late) for joint, late in content.get("delay", {}).get("seconds", {}).items()},
-            flip=tuple(content.get("flip", ())),
-            time_scale=float(clock.get("scale", 1.0)),
+            cutoff=_cutoff(content),
+            delays=numbers_by_name(object_at(content, "delay", "seconds"), "delay.seconds", -1.0, 1.0),
+            flip=texts(content.get("flip", []), "flip"),
+            time_scale=number(clock.get("scale", 1.0), "time_base.scale", 1e-9, 3600.0),
             quasi_static=bool(clock.get("quasi_static", False)),
-            torque_gains={
-                str(joint): float(g) for joint, g in content.get("torque_gains", {}).get("gains", {}).items()
-            },
+            torque_gains=numbers_by_name(
+                object_at(content, "torque_gains", "gains"), "torque_gains.gains", SMALLEST_GAIN, 1.0 / SMALLEST_GAIN
+            ),
         )
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        reason = f"there is no '{error.args[0]}'" if isinstance(error, KeyError) and error.args else str(error)
         raise ParameterError(
-            f"{path}: wanted the result.json of an identification, with its 'friction' and 'cutoff'; {error!r}"
+            f"{path}: wanted the result.json of an identification, with its 'friction' and 'cutoff'; {reason}"
         ) from error
+
+
+def _drives(content: Mapping[str, Any]) -> Drives:
+    if "friction" not in content:
+        raise KeyError("friction")
+    drives: dict[str, dict[str, float | None]] = {}
+    for owner in object_at(content, "friction"):
+        kinds = object_at(content, "friction", owner)
+        drives[owner] = {
+            kind: None if value is None else number(value, f"friction.{owner}.{kind}") for kind, value in kinds.items()
+        }
+    return drives
+
+
+def _cutoff(content: Mapping[str, Any]) -> float | None:
+    if "cutoff" not in content:
+        raise KeyError("cutoff")
+    value = object_at(content, "cutoff")["hz"]
+    return None if value is None else number(value, "cutoff.hz", LOWEST_CUTOFF, HIGHEST_CUTOFF)

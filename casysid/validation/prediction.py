@@ -14,6 +14,7 @@ from casysid.identification import BandChoice, TorqueError, choose_band, torque_
 from casysid.identification.passes import Passes
 from casysid.recording import Source
 from casysid.robot import Robot
+from casysid.signals.admission import check_recordings
 from casysid.threads import single_threaded
 from casysid.validation.earlier import Drives, EarlierResult
 
@@ -85,6 +86,7 @@ def validate(
         raise ParameterError("validate: at least one recording is needed; got none")
     earlier = earlier or EarlierResult()
     model = earlier.friction or FrictionModel(DEFAULT_FRICTION, _couplings(robot, earlier.drives))
+    check_recordings(recordings, cutoff=cutoff or earlier.cutoff, time_scale=earlier.time_scale)
     late = np.array([earlier.delays.get(dof, 0.0) for dof in robot.dofs])
     recordings = [recording.flipped(earlier.flip).with_time_scaled(earlier.time_scale) for recording in recordings]
     choice = choose_band(recordings, cutoff or earlier.cutoff)

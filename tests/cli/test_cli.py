@@ -1,6 +1,7 @@
 """The command line as a person meets it."""
 
 import dataclasses
+import hashlib
 import json
 import subprocess
 import sys
@@ -11,6 +12,8 @@ from typer.testing import CliRunner
 
 from casysid.bundled import find_model
 from casysid.cli.app import app
+from casysid.cli.bug_report import describe_fault
+from casysid.excitation import DesignStatus, design_set
 from casysid.simulation import PlantSettings
 from tests.simulated import simulated_run
 
@@ -99,8 +102,8 @@ BAD_INPUT = {
     "a robot that is not there": (["nowhere.urdf", "LOG"], "nowhere.urdf"),
     "a log that is not there": ([URDF, "nowhere.csv"], "nowhere.csv"),
     "an unknown method": ([URDF, "LOG", "--method", "magic"], "method must be one of"),
-    "a split above one": ([URDF, "LOG", "--split", "1.5"], "between 0 and 1"),
-    "a negative cut-off": ([URDF, "LOG", "--cutoff", "-3"], "positive number of Hz"),
+    "a split above one": ([URDF, "LOG", "--split", "1.5"], "--split wants 0.01 to 0.99 of the time"),
+    "a negative cut-off": ([URDF, "LOG", "--cutoff", "-3"], "--cutoff wants 0.01 to 10000 Hz"),
     "a delay that is not a number": ([URDF, "LOG", "--delay", "soon"], "--delay wants auto or a number of seconds"),
     "gravity that is not a number": ([URDF, "LOG", "--gravity", "0", "0", "nan"], "gravity"),
     "an unknown joint to lock": ([URDF, "LOG", "--lock", "elbowww=0"], "elbowww"),
@@ -136,6 +139,115 @@ def test_bad_logs_are_refused_at_the_door(case, tmp_path):
     assert answer.exit_code == 2
     assert message in answer.stderr
     assert "log.csv" in " ".join(answer.stderr.split()).replace(" ", "")
+    assert not (tmp_path / "out").exists()
+
+
+def unusable(tmp_path, case):
+    match case:
+        case "a file":
+            (tmp_path / "f").write_text("")
+            return tmp_path / "f"
+        case "below a file":
+            (tmp_path / "f").write_text("")
+            return tmp_path / "f" / "x"
+        case "a link to nowhere":
+            (tmp_path / "l").symlink_to("none")
+            return tmp_path / "l"
+    raise ValueError(case)
+
+
+VERBS = {
+    "identify": ["identify", URDF, "absent.csv"],
+    "compare": ["compare", URDF, "absent.csv"],
+    "validate": ["validate", URDF, "absent.csv"],
+    "excite": ["excite", "absent.urdf"],
+    "rehearse": ["rehearse", "absent.urdf"],
+}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("case", ["a file", "below a file", "a link to nowhere"])
+def test_a_place_that_cannot_be_written_to_is_found_before_anything_is_read(verb, case, tmp_path):
+    place = unusable(tmp_path, case)
+    if (verb, case) == ("compare", "a file"):
+        place = tmp_path / "none" / "x.json"
+    answer = run(*VERBS[verb], "--out", place)
+    assert answer.exit_code == 2, answer.output
+    message = " ".join(answer.stderr.split())
+    assert message.startswith(f"error: {place}: cannot be written: ")
+    assert "absent." not in message
+
+
+def test_another_run_replaces_the_files_of_the_one_before(log, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "notes.txt").write_text("mine")
+    (out / "identified.xml").write_text("of an earlier run")
+    for split in ("0.5", "0.6"):
+        answer = run("identify", URDF, log, "--split", split, "--cutoff", "12", "--method", "wls", "--out", out)
+        assert answer.exit_code == 0, answer.output
+    written = {"result.json", "identified.urdf", "moments.npz", "report.html", ".casysid.json"}
+    assert {path.name for path in out.iterdir()} == {*written, "notes.txt"}
+    listed = json.loads((out / ".casysid.json").read_text())["files"]
+    for name in written - {".casysid.json"}:
+        assert hashlib.sha256((out / name).read_bytes()).hexdigest() == listed[name]
+
+
+def test_a_fault_of_casysid_is_saved_for_whoever_can_mend_it(monkeypatch, tmp_path):
+    def fail(*arguments, **options):
+        raise ZeroDivisionError("a [bold]fault[/]")
+
+    monkeypatch.setattr("casysid.cli.info.load_robot", fail)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    answer = run("info", URDF)
+    assert answer.exit_code == 70
+    (saved,) = (tmp_path / "state" / "casysid").iterdir()
+    message = " ".join(answer.stderr.split())
+    assert message.startswith("internal error: ZeroDivisionError: a [bold]fault[/]. This is a fault of casysid")
+    assert str(saved) in message
+    assert "Traceback" not in answer.output
+    assert saved.stat().st_mode & 0o777 == 0o600
+    assert "raise ZeroDivisionError" in saved.read_text()
+
+
+def test_a_fault_is_saved_somewhere_even_without_a_home(monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file" / "state"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert str(tmp_path / "casysid-fault-") in describe_fault(ValueError("x"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "none"))
+    assert "could not be saved (No such file or directory)" in describe_fault(ValueError("x"))
+
+
+def test_ctrl_c_says_what_was_written(log, monkeypatch, tmp_path):
+    def interrupt(*arguments, **options):
+        raise KeyboardInterrupt
+
+    command = ["identify", URDF, log, "--cutoff", "12", "--method", "wls", "--out", tmp_path / "out"]
+    monkeypatch.setattr("casysid.cli.identify._print", interrupt)
+    after = run(*command)
+    assert (after.exit_code, after.stderr.split("\n")[-2]) == (
+        130,
+        f"interrupted; the files in {tmp_path / 'out'} are complete",
+    )
+    before = {path: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    monkeypatch.setattr("casysid.report.html.render_report", interrupt)
+    during = run(*command)
+    assert (during.exit_code, during.stderr.strip()) == (130, "interrupted; nothing was written")
+    assert {path: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
+
+
+def test_an_interrupted_design_is_not_written(monkeypatch, tmp_path):
+    real = design_set
+
+    def interrupted(problem, count, **options):
+        design = real(problem, count, **{**options, "starts": 1})[0]
+        return (dataclasses.replace(design, status=DesignStatus.INTERRUPTED),)
+
+    monkeypatch.setattr("casysid.excitation.design_set", interrupted)
+    answer = run("excite", URDF, "--harmonics", "2", "--out", tmp_path / "out")
+    assert answer.exit_code == 130, answer.output
+    assert "interrupted; nothing was written" in answer.stderr
     assert not (tmp_path / "out").exists()
 
 

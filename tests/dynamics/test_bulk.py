@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from casysid.dynamics import Bulk, bulk, compiled
+from casysid.dynamics import Bulk, bulk, compiled, kernel_cache
 from casysid.dynamics.instructions import OPERATIONS
-from casysid.errors import ParameterError
+from casysid.errors import CasysidWarning, ParameterError
 
 needs_compiler = pytest.mark.skipif(
     shutil.which("gcc") is None and shutil.which("cc") is None, reason="needs a compiler"
@@ -129,12 +129,8 @@ def test_without_a_compiler_the_replay_serves(monkeypatch):
 
 @needs_compiler
 @pytest.mark.usefixtures("compile_at_once")
-@pytest.mark.parametrize("fault", ["flags", "directory"])
-def test_any_failure_to_compile_leaves_the_replay(fault, cache, monkeypatch):
-    if fault == "flags":
-        monkeypatch.setattr(compiled, "_FLAGS", ("-fno-such-flag",))
-    else:
-        cache.parent.write_text("a file where a directory should be")
+def test_any_failure_to_compile_leaves_the_replay(monkeypatch):
+    monkeypatch.setattr(compiled, "_FLAGS", ("-fno-such-flag",))
     evaluator = Bulk(ARITHMETIC)
     np.testing.assert_allclose(evaluator.evaluate(*samples(5)), one_by_one(ARITHMETIC, *samples(5)), rtol=1e-14)
     assert evaluator.route == "replay"
@@ -142,15 +138,106 @@ def test_any_failure_to_compile_leaves_the_replay(fault, cache, monkeypatch):
 
 @needs_compiler
 @pytest.mark.usefixtures("compile_at_once")
-def test_a_broken_library_in_the_cache_is_compiled_again(cache):
-    function = ca.Function("f", [X], [ca.cos(X) + 17])
-    library = compiled._library(compiled.write_source(function))
-    library.parent.mkdir(parents=True)
-    library.write_bytes(b"not a library")
-    assert compiled.find_kernel(function) is None
-    evaluator = Bulk(function)
-    np.testing.assert_allclose(evaluator.evaluate(np.zeros((5, 1))), np.full((5, 1), 18.0))
+def test_a_kernel_that_cannot_be_kept_is_used_all_the_same(cache):
+    cache.parent.write_text("a file where a directory should be")
+    evaluator = Bulk(ARITHMETIC)
+    np.testing.assert_allclose(evaluator.evaluate(*samples(5)), one_by_one(ARITHMETIC, *samples(5)), rtol=1e-14)
     assert evaluator.route == "compiled"
+
+
+@needs_compiler
+@pytest.mark.usefixtures("compile_at_once")
+@pytest.mark.parametrize("fault", ["ended early", "changed", "not a library", "of another source"])
+def test_a_damaged_library_in_the_cache_is_compiled_again_with_a_word(cache, fault):
+    function, other = ca.Function("f", [X], [ca.cos(X) + 17]), ca.Function("f", [X], [ca.cos(X) + 18])
+    compiled.compile_kernel(other)
+    (foreign,) = cache.iterdir()
+    compiled.compile_kernel(function)
+    (library,) = set(cache.iterdir()) - {foreign}
+    content = library.read_bytes()
+    library.write_bytes(
+        {
+            "ended early": content[:8192],
+            "changed": content[:4096] + bytes(1024) + content[5120:],
+            "not a library": b"not a library",
+            "of another source": foreign.read_bytes(),
+        }[fault]
+    )
+    evaluator = Bulk(function)
+    with pytest.warns(CasysidWarning, match=f"{library} is damaged; it was removed"):
+        np.testing.assert_array_equal(evaluator.evaluate(np.zeros((5, 1))), np.full((5, 1), 18.0))
+    assert evaluator.route == "compiled"
+    assert library.read_bytes() == content
+
+
+@needs_compiler
+@pytest.mark.usefixtures("compile_at_once")
+@pytest.mark.parametrize("fault", ["writable file", "link", "pipe", "file of another"])
+def test_a_library_that_somebody_else_may_have_written_is_not_loaded(cache, fault, tmp_path):
+    function = ca.Function("f", [X], [ca.cos(X) + 17])
+    compiled.compile_kernel(function)
+    (library,) = cache.iterdir()
+    match fault:
+        case "writable file":
+            library.chmod(0o666)
+        case "link":
+            library.rename(tmp_path / "elsewhere.so")
+            library.symlink_to(tmp_path / "elsewhere.so")
+        case "pipe":
+            library.unlink()
+            os.mkfifo(library)
+        case _:
+            change_owner(library)
+    with pytest.warns(CasysidWarning, match=f"{library} .*; it was removed"):
+        assert compiled.find_kernel(function) is None
+    assert not os.path.lexists(library)
+
+
+@needs_compiler
+@pytest.mark.usefixtures("compile_at_once")
+@pytest.mark.parametrize("fault", ["writable", "of another"])
+def test_a_cache_that_others_can_write_to_is_neither_read_nor_written(cache, fault):
+    function = ca.Function("f", [X], [ca.cos(X) + 17])
+    compiled.compile_kernel(function)
+    cache.chmod(0o777) if fault == "writable" else change_owner(cache)
+    before = {path: path.read_bytes() for path in cache.iterdir()}
+    with pytest.warns(CasysidWarning, match=f"the folder {cache} .* nothing is loaded from it nor kept there"):
+        assert compiled.find_kernel(function) is None
+    with pytest.warns(CasysidWarning, match="nothing is loaded"):
+        assert compiled.compile_kernel(function) is not None
+    assert {path: path.read_bytes() for path in cache.iterdir()} == before
+
+
+@needs_compiler
+def test_a_relative_cache_directory_is_ignored_with_a_word(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", "c")
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    with pytest.warns(CasysidWarning, match="XDG_CACHE_HOME is 'c'; wanted an absolute path"):
+        assert compiled.compile_kernel(ARITHMETIC) is not None
+    assert not (tmp_path / "c").exists()
+    assert list((tmp_path / "home/.cache/casysid/kernels").iterdir())
+
+
+def change_owner(path):
+    if os.geteuid() != 0:
+        pytest.skip("needs root")
+    os.chown(path, 12345, -1)
+
+
+@needs_compiler
+@pytest.mark.parametrize("seed", range(3))
+def test_both_routes_give_the_same_bits(cache, seed, monkeypatch):
+    inputs = samples(5000, seed)
+    replayed = Bulk(OPERATING).evaluate(*inputs)
+    monkeypatch.setattr(bulk, "FIND_FROM", 0)
+    monkeypatch.setattr(bulk, "COMPILE_FROM", 0)
+    built = Bulk(OPERATING)
+    assert built.evaluate(*inputs).tobytes() == replayed.tobytes()
+    monkeypatch.setattr(bulk, "COMPILE_FROM", np.inf)
+    found = Bulk(OPERATING)
+    assert found.evaluate(*inputs).tobytes() == replayed.tobytes()
+    assert (built.route, found.route) == ("compiled", "compiled")
 
 
 @needs_compiler
@@ -181,7 +268,7 @@ def test_many_may_compile_the_same_at_once(cache):
 @needs_compiler
 @pytest.mark.usefixtures("compile_at_once")
 def test_the_cache_keeps_the_newest_kernels_only(cache, monkeypatch):
-    monkeypatch.setattr(compiled, "_KEPT", 2)
+    monkeypatch.setattr(kernel_cache, "KEPT", 2)
     for k in range(4):
         Bulk(ca.Function("f", [X], [k + X])).evaluate(np.zeros((5, 1)))
     assert len(os.listdir(cache)) == 2

@@ -162,8 +162,8 @@ def test_one_instant_takes_what_is_remembered_as_an_input():
 def test_displacements_are_proposed_in_proportion_to_the_travel():
     direction = Direction("joint_1", np.eye(3)[0], linear=False)
     several = list(MaxwellSlip.candidates(JointUse(direction, 1.0, 0.02, travel=0.5)))
-    assert [one.displacements["joint_1"][0] for one in several] == [0.005, 0.015, 0.05]
-    assert several[0].describe(direction) == "hysteresis (Maxwell slip over 0.005, 0.0015 rad)"
+    assert [one.displacements["joint_1"] for one in several] == [(0.0005,), (0.0015,), (0.005,), (0.015,), (0.05,)]
+    assert several[1].describe(direction) == "hysteresis (Maxwell slip over 0.0015 rad)"
     assert list(MaxwellSlip.candidates(JointUse(direction, 1.0, 0.02))) == []
 
 

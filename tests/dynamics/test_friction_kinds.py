@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from casysid.dynamics import (
     DEFAULT_FRICTION,
+    Armature,
     AsymmetricViscous,
     Coupling,
     DriveState,
@@ -103,6 +104,19 @@ def test_an_extended_regressor_has_the_same_columns_and_more():
     theta = np.arange(len(extended.names), dtype=float)
     np.testing.assert_allclose(extended.predict(theta, *MOTION), Y @ theta, rtol=1e-9, atol=1e-9)
     assert len(set(extended.names)) == len(extended.names)
+
+
+def test_an_extended_regressor_measures_torque_as_its_base_does():
+    sensing = {"quasi_static": True, "torque_gains": (2.0, 1.0, 0.5)}
+    direction = joint_directions(ARM)[0]
+    extended = extend_regressor(
+        build_regressor(ARM, [Viscous()], **sensing), [(Spring(), direction), (Armature(), direction)]
+    )
+    Y = extended.evaluate(*MOTION)
+    np.testing.assert_allclose(Y[:, :, 30], np.outer(2.0 * v[:, 0], [1.0, 0.0, 0.0]), atol=1e-12)
+    np.testing.assert_allclose(Y[:, :, 33], np.outer(2.0 * q[:, 0], [1.0, 0.0, 0.0]), atol=1e-12)
+    assert not Y[:, :, 34].any()
+    assert extended.column_kinds == ("",) * 30 + ("viscous",) * 3 + ("stiffness", "armature")
 
 
 def test_widths_are_set_where_there_is_a_smooth_sign():

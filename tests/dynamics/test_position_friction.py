@@ -18,6 +18,7 @@ from casysid.dynamics import (
 )
 from casysid.dynamics.friction.wave_numbers import ripple_wave_numbers
 from casysid.errors import ParameterError
+from casysid.identification.friction_candidates import joint_uses, with_ripples
 from casysid.robot import JointKind
 from tests.strategies import random_motion, random_robot
 
@@ -119,6 +120,21 @@ def test_a_joint_without_end_has_whole_wave_numbers():
     assert ripple_wave_numbers(wrapped, np.cos(12.0 * s) + rng.normal(size=5000), 20.0, unlimited=True) == (12.0,)
     with pytest.raises(ParameterError, match="'joint_3' turns without end, so wave_numbers must be whole"):
         build_regressor(ARM, [Ripple({"joint_3": (2.5,)})])
+
+
+def test_a_first_models_residual_says_where_waves_are():
+    rng = np.random.default_rng(5)
+    time = 0.01 * np.arange(5000)
+    position = np.column_stack([slow_waves(rng, 5000)[0] for _ in range(3)])
+    velocity = np.gradient(position, time, axis=0)
+    residual = 0.1 * rng.normal(size=(5000, 3))
+    residual[:, 0] += 0.1 * np.cos(30.0 * position[:, 0])
+    residual[:, 1] += 0.1 * np.sin(20.0 * position[:, 1]) * np.sign(velocity[:, 1])
+    speed = np.sqrt(np.mean(velocity**2, axis=0))
+    uses = with_ripples(joint_uses(ARM, speed, 0.01 * speed), position, velocity, residual, 10.0)
+    assert uses[0].ripple == pytest.approx((30.0,), abs=0.1)
+    assert uses[1].friction_ripple == pytest.approx((20.0,), abs=0.1)
+    assert [uses[0].friction_ripple, uses[1].ripple, uses[2].ripple, uses[2].friction_ripple] == [()] * 4
 
 
 def test_what_the_residual_shows_is_proposed():

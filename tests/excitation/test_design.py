@@ -29,7 +29,8 @@ from casysid.excitation import (
 )
 from casysid.excitation.output import sample_recording
 from casysid.excitation.words import expected_std
-from casysid.moments import Moments, write_moments
+from casysid.moments import Moments
+from casysid.moments_file import write_moments
 from casysid.recording import read_recording
 from casysid.report.excitation_pictures import write_excitation_pictures
 from casysid.robot import JointKind, Robot

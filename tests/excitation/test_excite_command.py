@@ -39,13 +39,13 @@ def test_a_second_motion_is_designed_for_what_the_first_does_not_tell(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--period", "0"), "period must be a positive"),
-        (("--harmonics", "1"), "at least 2"),
+        (("--period", "0"), "--period wants 0.1 to 3600 s"),
+        (("--harmonics", "1"), "--harmonics wants 2 to 100"),
         (("--box", "1,2"), "--box wants 6 numbers"),
         (("--keep-in", "hand=0,0,0,1,1,1"), "no link is named 'hand'"),
         (("--start", "0,9"), "start of joint 'elbow'"),
         (("--floor", "3"), "distance of link"),
-        (("--count", "0"), "at least one trajectory"),
+        (("--count", "0"), "--count wants 1 to 100"),
     ],
 )
 def test_bad_requests_end_with_a_message_and_code_2(tmp_path, arguments, message):

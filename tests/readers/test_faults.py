@@ -13,7 +13,7 @@ import pytest
 from pyarrow import parquet
 
 from casysid.errors import RecordingError
-from casysid.recording import read_recording, read_recordings
+from casysid.recording import open_recording, read_recording, read_recordings
 from casysid.robot import Robot
 
 Columns = dict[str, np.ndarray]
@@ -312,9 +312,10 @@ def test_broken_input_is_refused_with_a_reason(fault: str, arm: Robot, columns: 
     name, make, message = FAULTS[fault]
     path = tmp_path / name
     make(path, columns)
-    with pytest.raises(RecordingError, match=message) as caught:
-        read_recording(path, arm)
-    assert str(caught.value).startswith(f"{path}: ")
+    for read in (read_recording, open_recording):
+        with pytest.raises(RecordingError, match=message) as caught:
+            read(path, arm)
+        assert str(caught.value).startswith(f"{path}: ")
 
 
 def test_a_quaternion_must_have_unit_length(columns: Columns, tmp_path: Path) -> None:

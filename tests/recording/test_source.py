@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from casysid.errors import CasysidWarning, ParameterError, RecordingError
-from casysid.readers.writing import columns_of, write_columns
+from casysid.readers.writing import write_columns
 from casysid.recording import Recording, RecordingFile, Source, open_recording, open_recordings, read_recording
 from casysid.recording.pieces import pieces
 from casysid.robot import Robot
@@ -210,11 +210,11 @@ def test_figures_and_warnings_are_those_of_reading(suffix: str, tmp_path: Path, 
     recording = Recording(channels=NAMES, dofs=NAMES, time=time, position=wave, torque=torque)
     path = tmp_path / f"log{suffix if suffix.startswith('.') else '.npz'}"
     if suffix == "compressed":
-        np.savez_compressed(path, **columns_of(recording))  # type: ignore[arg-type]
+        np.savez_compressed(path, **recording.columns())  # type: ignore[arg-type]
     elif suffix == "fortran":
         np.savez(path, time=time, q=np.asfortranarray(wave), tau=torque)
     else:
-        write_columns(path, columns_of(recording))
+        write_columns(path, recording.columns())
     said = []
     for read in (read_recording, open_recording):
         with warnings.catch_warnings(record=True) as caught:

@@ -1,5 +1,6 @@
 """Tables and the HTML report of one identification: complete, in the right units, and one file alone."""
 
+import dataclasses
 import html.parser
 import math
 
@@ -12,6 +13,7 @@ from casysid.report import drive_table, error_table, link_table, noise_table, re
 from casysid.report.overview import robot_tables
 from casysid.report.tables import number, percent, torque_unit, torque_units
 from casysid.robot import JointKind
+from casysid.signals import NoiseLevels, find_input_noise
 from casysid.simulation import PlantSettings
 from tests.simulated import bundled_robot, simulated_run
 from tests.strategies import random_robot
@@ -22,9 +24,7 @@ UNIT = {JointKind.REVOLUTE: "N m", JointKind.PRISMATIC: "N"}
 @pytest.fixture(scope="module")
 def result():
     runs = [simulated_run("two_link", seed, PlantSettings()).recording for seed in (0, 1)]
-    settings = Settings(
-        method=ErrorsInVariables(), cutoff=20.0, coulomb_width=0.02, delay=0.0, choose_friction=False
-    )
+    settings = Settings(method=ErrorsInVariables(), cutoff=20.0, coulomb_width=0.02, delay=0.0, choose_friction=False)
     return identify(bundled_robot("two_link"), runs[0], settings, held_out=runs[1:])
 
 
@@ -42,11 +42,17 @@ def test_numbers_are_written_as_people_do():
 
 
 def test_every_row_has_a_cell_for_every_title(result):
-    tables = [make(result) for make in (error_table, drive_table, link_table, noise_table)]
+    recording = simulated_run("two_link", 0, PlantSettings()).recording
+    noisy = dataclasses.replace(result, input_noise=find_input_noise(recording, NoiseLevels(), as_logged=False))
+    tables = [*(make(result) for make in (error_table, drive_table, link_table)), noise_table(noisy)]
     tables += [table for _, table in robot_tables(result.robot)]
     for table in tables:
         assert table.rows
         assert {len(row) for row in table.rows} == {len(table.header)}
+
+
+def test_noise_that_no_method_needed_is_not_told(result):
+    assert noise_table(result) is None
 
 
 def test_the_error_table_tells_the_held_out_error_of_every_joint(result):

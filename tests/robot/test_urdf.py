@@ -127,7 +127,7 @@ BROKEN = {
     "no links": ("<robot/>", "has no <link>"),
     "xacro macro": (
         ARM.replace('<robot name="arm">', '<robot name="arm" xmlns:xacro="x"><xacro:arm/>'),
-        r"arm\.urdf:3: is a xacro file, not yet expanded; run `xacro arm\.urdf > arm\.urdf`",
+        r"arm\.urdf:3: is a xacro file, not yet expanded; run `xacro arm\.urdf > arm_expanded\.urdf`",
     ),
     "xacro expression": (ARM.replace('value="2.0"', 'value="${m}"'), "is a xacro file"),
     "no moving joint": ('<robot name="x"><link name="a"/></robot>', "no joint moves"),

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from casysid.errors import ParameterError, RobotError
+from casysid.errors import OutputError, ParameterError, RobotError
 from casysid.robot import Robot, write_robot
 from tests.robot.bodies import consistent_parameters
 from tests.robot.urdf_models import ARM, trees
@@ -140,7 +140,7 @@ def test_nothing_is_left_behind_where_writing_fails(arm, tmp_path):
         write_robot(arm, tmp_path / "new.urdf", [1, 2, 3])
     with pytest.raises(ParameterError, match="damping: must be finite; number 1 is not"):
         write_robot(arm, tmp_path / "new.urdf", arm.inertial_parameters, damping=[0, np.nan])
-    with pytest.raises(RobotError, match="cannot be written: No such file or directory"):
+    with pytest.raises(OutputError, match="cannot be written: No such file or directory"):
         write_robot(arm, tmp_path / "none" / "new.urdf", arm.inertial_parameters)
     arm.source.write_text(ARM.replace('xyz="0.4 0 0"', 'xyz="0.5 0 0"'))
     with pytest.raises(RobotError, match="joint 'elbow' stands elsewhere in the written file; it was not kept"):

@@ -112,4 +112,4 @@ def test_bad_input_ends_with_two_and_one_message(tmp_path):
     assert "error:" in answer.stderr
     answer = CliRunner().invoke(app, ["rehearse", "two_link", "--duration", "1", "--out", str(tmp_path)])
     assert answer.exit_code == 2
-    assert "at least 4 s" in answer.stderr
+    assert "--duration wants 4 to 3600 s" in answer.stderr

@@ -29,9 +29,9 @@ from casysid.identification.passes import Passes
 from casysid.identification.settings import Settings
 from casysid.moments import Indices, Moments
 
-DISPLACEMENTS = (0.01, 0.03, 0.1, 0.3)
-"""Of the elements of friction before sliding, in standard deviations of the position: half-decades below the travel,
-down to where an element is as sharp as Coulomb's smooth sign."""
+DISPLACEMENTS = (0.0003, 0.003, 0.03, 0.3)
+"""Of the elements of friction before sliding, in standard deviations of the position: decades below the travel, down to
+where an element turns as sharply as a step, at the reversal of the position and not of a smoothed velocity."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from casysid.arrays import Array
+from casysid.dynamics import DEFAULT_FRICTION
 from casysid.estimation.cross_validation import contiguous_folds
 from casysid.identification.passes import Passes
 from casysid.identification.tuning.candidates import Candidates
@@ -151,9 +152,14 @@ def split_moments(candidates: Candidates) -> SplitMoments:
 
 
 def _drive_columns(candidates: Candidates, dof: str) -> list[int]:
-    """Columns of a joint's usual friction and rotor."""
+    """Columns of a joint's ordinary friction and rotor: friction before sliding could stand for what inertia leaves."""
     n = int(candidates.base.robot.inertial_parameters.size)
-    return [k for k, parameter in enumerate(candidates.base.parameters) if k >= n and parameter.owner == dof]
+    ordinary = [kind.kind for kind in DEFAULT_FRICTION]
+    return [
+        k
+        for k, parameter in enumerate(candidates.base.parameters)
+        if k >= n and parameter.owner == dof and parameter.kind in ordinary
+    ]
 
 
 def inertial_shares(split: SplitMoments) -> Array:

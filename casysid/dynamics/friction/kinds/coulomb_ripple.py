@@ -26,8 +26,8 @@ MOST_WAVES = 3
 class CoulombRipple(SmoothSign, Harmonics):
     """What dry friction is more or less at a position, ``sign(velocity) cos(k s)``, ``sign(velocity) sin(k s)``.
 
-    Together with Coulomb's own it never drives: where both turn within the same width,
-    the amplitudes of its waves add up to no more than that.
+    Together with Coulomb's own, which turns within the same width, it never drives: the amplitudes of its waves add up
+    to no more than that.
 
     Source: Popovic and Goldenberg, "Modeling of friction using spectral analysis" (1998), friction as a series over
     position.
