@@ -126,7 +126,9 @@ def propagate(
 
 
 @single_threaded()
-def torque_std(regressor: Regressor, covariance: Array, q: Array, v: Array, a: Array) -> Array:
+def torque_std(
+    regressor: Regressor, covariance: Array, q: Array, v: Array, a: Array, *, time: Array | None = None
+) -> Array:
     """Standard error of the predicted torque that comes of the parameters', shape (N, nv), [N m].
 
     A band for a measured torque adds the residuals: ``√(torque_std² + noise_std²)``.
@@ -137,11 +139,12 @@ def torque_std(regressor: Regressor, covariance: Array, q: Array, v: Array, a: A
         q: Shape (N, nq).
         v: Shape (N, nv).
         a: Shape (N, nv).
+        time: Of the samples, whose friction may remember those before [s], shape (N,); None numbers them.
     """
-    result = np.empty((len(q), regressor.robot.nv))
+    result, histories = np.empty((len(q), regressor.robot.nv)), regressor.histories(q, time)
     for start in range(0, len(q), CHUNK):
         rows = slice(start, start + CHUNK)
-        Y = regressor.evaluate(q[rows], v[rows], a[rows])
+        Y = regressor.evaluate(q[rows], v[rows], a[rows], histories=tuple(one[rows] for one in histories))
         result[rows] = np.sqrt(np.maximum(np.einsum("njp,njp->nj", Y @ covariance, Y), 0.0))
     return result
 

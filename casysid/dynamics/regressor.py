@@ -151,7 +151,13 @@ class Regressor:
         return (np.stack(signals, axis=1),)
 
     def evaluate(
-        self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike, *, time: npt.ArrayLike | None = None
+        self,
+        q: npt.ArrayLike,
+        v: npt.ArrayLike,
+        a: npt.ArrayLike,
+        *,
+        time: npt.ArrayLike | None = None,
+        histories: tuple[Array, ...] | None = None,
     ) -> Array:
         """``Y`` at every sample, dense, shape (N, nv, p): 8 N nv p bytes.
 
@@ -160,13 +166,15 @@ class Regressor:
             v: Velocities, shape (N, nv).
             a: Accelerations, shape (N, nv).
             time: As for :meth:`histories`.
+            histories: What these gave for the samples, where they are some of many; None asks.
 
         Raises:
             ParameterError: When a shape does not fit.
         """
         nv, p = self.robot.nv, len(self.parameters)
         rows = self.equations
-        inputs, samples = rows.check((q, v, a, np.zeros(nv), *self.histories(q, time)))
+        remembered = self.histories(q, time) if histories is None else histories
+        inputs, samples = rows.check((q, v, a, np.zeros(nv), *remembered))
         out = np.zeros((samples, nv * p))
         places = np.concatenate([np.append(dof * p + columns, -1) for dof, columns in enumerate(self.row_columns)])
         filled = places >= 0  # without the torques

@@ -23,5 +23,5 @@ def torque_band(result: IdentificationResult, motion: Motion, level: float = 0.9
         level: Share of the measured torque within the band.
     """
     sure = result.uncertainty
-    std = torque_std(result.regressor, sure.covariance, motion.q, motion.v, motion.a)
+    std = torque_std(result.regressor, sure.covariance, motion.q, motion.v, motion.a, time=motion.time)
     return np.asarray(sure.quantile(level) * np.sqrt(std**2 + result.train.rmse**2))

@@ -9,6 +9,7 @@ coefficients obey the laws of friction. Otherwise it is out until another one ha
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -16,6 +17,7 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.dynamics import Parameter, Regressor
+from casysid.errors import CasysidWarning
 from casysid.estimation import EmpiricalBayes, Estimate
 from casysid.estimation.cross_validation import contiguous_folds
 from casysid.estimation.evidence import centre_of
@@ -200,7 +202,9 @@ def fit_model(candidates: Candidates, model: Indices, settings: Settings) -> Est
     )
     moments = candidates.moments.select_columns(model)
     method = EmpiricalBayes(standard_errors=False)
-    return method.estimate_among(moments, prior, possible_parameters(problem, prior))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CasysidWarning)  # of an inconsistent model file: the answer's projection warns
+        return method.estimate_among(moments, prior, possible_parameters(problem, prior))
 
 
 def at_zero(parameters: Sequence[Parameter], values: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
