@@ -32,6 +32,7 @@ DRAWS = 2
 LONG = 50_000
 """So many samples average well enough by themselves: one pair will do."""
 DRAWS_AS_LOGGED = 4
+"""And where they are not: the parabola adds nine times the variance of one growth to that of the other."""
 EXPECTED_KINDS = (Coulomb.kind, LoadedCoulomb.kind, PowerViscous.kind, Stribeck.kind, MaxwellSlip.kind)
 """Columns that are an expectation, given the noisy motion, and not a noisy value."""
 
