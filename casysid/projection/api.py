@@ -77,6 +77,7 @@ def constrained_least_squares(
     return solve_task(task_of(problem, misfit_of_equations(equations), prior), progress)
 
 
+@single_threaded()
 def convex_least_squares(
     problem: ProjectionProblem, equations: NormalEquations, prior: npt.ArrayLike | None = None
 ) -> Array:
@@ -104,6 +105,7 @@ def possible_parameters(
         prior: As for :func:`project`.
     """
 
+    @single_threaded()
     def nearest(estimate: Array, metric: Array, residual_energy: float) -> Array:
         task = task_of(problem, misfit_of_estimate(metric, estimate, residual_energy), prior)
         certificate = certify(task, USUAL_WEIGHT)

@@ -6,7 +6,6 @@ import json
 import numpy as np
 import pytest
 import typer
-from casysid.identification.friction_choice import choose_friction
 from typer.testing import CliRunner
 
 from casysid.cli.identify import identify as identify_verb

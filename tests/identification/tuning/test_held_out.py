@@ -62,9 +62,7 @@ def test_the_gain_is_what_free_sizes_add_to_the_evidence(seed, width):
     x = np.linalg.qr(rng.normal(size=(200, KNOWN + width)))[0]
     y = x @ rng.normal(size=KNOWN + width) * 5.0 + rng.normal(size=200)
     folds = np.array_split(np.arange(4), 2)
-    held_out = HeldOut(
-        Moments.from_rows(x, y, blocks=4), np.arange(KNOWN), np.ones(1), np.zeros((KNOWN, KNOWN)), folds
-    )
+    held_out = HeldOut(Moments.from_rows(x, y, blocks=4), np.arange(KNOWN), np.ones(1), np.zeros((KNOWN, KNOWN)), folds)
     C = x[:, KNOWN:]
     sizes = np.append(0.0, np.geomspace(1e-4, 1e4, 4000))
     q = np.sum((C.T @ y) ** 2)
