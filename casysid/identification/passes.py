@@ -16,7 +16,7 @@ from casysid.identification.tuning.band import BandChoice
 from casysid.moments import Moments
 from casysid.recording import Source
 from casysid.robot import Robot
-from casysid.signals import BandAverage, Motion, motion_from_recording
+from casysid.signals import BandAverage, Motion, motion_from_recording, noise_of
 
 SAMPLES_PER_PERIOD = 100
 """Of the equations' cut-off: a boxcar of so many samples a period has a gain of ``1 - 1.6e-4`` there."""
@@ -94,6 +94,16 @@ class Passes:
         """Standard deviation of the position of each degree of freedom within a recording, shape (nv,)."""
         spread = [np.var(continued_positions(self.robot, motion.q), axis=0) for motion in self.sparse_motions]
         return np.asarray(np.sqrt(np.mean(spread, axis=0)))
+
+    @cached_property
+    def noise(self) -> Array:
+        """Standard deviation of the positions' noise of joints with one channel, zero for others, shape (nv,)."""
+        levels = np.sqrt(np.mean([noise_of(one.spectrum) ** 2 for one in self.recordings], axis=0))
+        found = np.zeros(self.robot.nv)
+        for joint in self.robot.joints:
+            if joint.v.stop - joint.v.start == joint.channels.stop - joint.channels.start == 1:
+                found[joint.v] = levels[joint.channels]
+        return found
 
     @cached_property
     def width(self) -> Array:

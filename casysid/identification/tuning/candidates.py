@@ -32,6 +32,9 @@ from casysid.moments import Indices, Moments
 DISPLACEMENTS = (0.01, 0.03, 0.1, 0.3)
 """Of the elements of friction before sliding, in standard deviations of the position: half-decades below the travel,
 down to where an element is as sharp as Coulomb's smooth sign."""
+CLEAR_OF_NOISE = 3.0
+"""Standard deviations of the positions' noise that a joint's smallest element must have for a method that takes this
+noise out of the moments: the slip of a smaller one under noise is no expectation, and its noise would stay."""
 
 
 @dataclass(frozen=True)
@@ -84,12 +87,14 @@ def usual_friction(passes: Passes, settings: Settings) -> tuple[FrictionKind, ..
     friction = with_width(settings.friction, width)
     if passes.band.cutoff is None or not settings.choose_friction or MaxwellSlip.kind in [one.kind for one in friction]:
         return friction
-    displacements = {
-        direction.name: tuple(share * passes.travel[dof] for share in DISPLACEMENTS)
-        for dof, direction in joint_directions(passes.robot).items()
-        if passes.travel[dof] > 0.0 and dof in _single(passes)
+    directions, single = joint_directions(passes.robot), _single(passes)
+    smallest = CLEAR_OF_NOISE * passes.noise if settings.method.needs_input_noise else np.zeros(passes.robot.nv)
+    found = {
+        directions[dof].name: tuple(share * passes.travel[dof] for share in DISPLACEMENTS)
+        for dof in directions
+        if passes.travel[dof] > 0.0 and dof in single and DISPLACEMENTS[0] * passes.travel[dof] >= smallest[dof]
     }
-    return (*friction, MaxwellSlip(displacements)) if displacements else friction
+    return (*friction, MaxwellSlip(found)) if found else friction
 
 
 def gather_candidates(passes: Passes, settings: Settings) -> Candidates:
