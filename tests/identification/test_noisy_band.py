@@ -7,8 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from casysid.identification import choose_band
+from casysid.bundled import find_model
+from casysid.dynamics import MaxwellSlip
+from casysid.estimation import EmpiricalBayes, ErrorsInVariables
+from casysid.identification import Settings, choose_band
+from casysid.identification.passes import Passes
+from casysid.identification.tuning.candidates import usual_friction
 from casysid.recording import Recording
+from casysid.robot import Robot
 from casysid.signals import cutoff_of
 
 RATE = 200.0
@@ -52,3 +58,17 @@ def test_one_noisy_recording_among_three_has_no_majority():
     quiet, loud = recording(1e-5, 3.0), recording(1e-2, 3.0)
     assert choose_band([quiet, loud, quiet]).noise_limit == np.inf
     assert choose_band([loud, quiet, loud]).noise_limit < np.inf
+
+
+@pytest.mark.parametrize(("noise", "slips"), [(1e-6, True), (0.1, False)])
+def test_noise_is_only_taken_out_where_friction_before_sliding_is_larger(noise, slips):
+    robot = Robot.from_file(find_model("two_link.urdf"))
+    time = np.arange(2000) / RATE
+    position = np.sin(2.0 * np.pi * np.array([0.5, 0.7]) * time[:, None])
+    position = position + noise * np.random.default_rng(0).normal(size=position.shape)
+    log = Recording(channels=robot.channels, dofs=robot.dofs, time=time, position=position, torque=position)
+    passes = Passes(robot, [log], choose_band([log]))
+    assert passes.noise == pytest.approx(noise, rel=0.2)
+    for method, expected in ((ErrorsInVariables(), slips), (EmpiricalBayes(), True)):
+        kinds = [kind.kind for kind in usual_friction(passes, Settings(method=method))]
+        assert (MaxwellSlip.kind in kinds) == expected

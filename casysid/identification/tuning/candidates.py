@@ -36,6 +36,8 @@ DISPLACEMENTS = (0.0003, 0.003, 0.03, 0.3)
 where an element turns as sharply as a step, at the reversal of the position and not of a smoothed velocity."""
 SHARPER = 10.0
 """Width of the usual smooth sign over that of the sharp one: a decade, as between the displacements."""
+CLEAR_OF_NOISE = 3.0
+"""Standard deviations of the smoothed positions' noise that an element must be wide: a narrower one turns with noise."""
 
 
 @dataclass(frozen=True)
@@ -91,11 +93,15 @@ def usual_friction(passes: Passes, settings: Settings) -> tuple[FrictionKind, ..
     friction = with_width(settings.friction, width)
     if passes.band.cutoff is None or not settings.choose_friction:
         return friction
-    displacements = {
-        direction.name: tuple(share * passes.travel[dof] for share in DISPLACEMENTS)
-        for dof, direction in joint_directions(passes.robot).items()
-        if passes.travel[dof] > 0.0 and dof in _single(passes)
+    directions, single, smallest = joint_directions(passes.robot), _single(passes), CLEAR_OF_NOISE * passes.noise
+    clear = {
+        directions[dof].name: [
+            share * passes.travel[dof] for share in DISPLACEMENTS if share * passes.travel[dof] > smallest[dof]
+        ]
+        for dof in directions
+        if dof in single
     }
+    displacements = {name: tuple(several) for name, several in clear.items() if several}
     usual: list[FrictionKind] = [SharpCoulomb(tuple((passes.width / SHARPER).tolist())), LoadedCoulomb(width)]
     if displacements:
         usual.append(MaxwellSlip(displacements))
