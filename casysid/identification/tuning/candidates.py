@@ -37,7 +37,7 @@ where an element turns as sharply as a step, at the reversal of the position and
 SHARPER = 10.0
 """Width of the usual smooth sign over that of the sharp one: a decade, as between the displacements."""
 CLEAR_OF_NOISE = 3.0
-"""Standard deviations of the smoothed positions' noise that an element must be wide: a narrower one turns with noise."""
+"""Standard deviations of the smoothed positions' noise that an element must be wide: a narrower one turns with it."""
 
 
 @dataclass(frozen=True)
