@@ -1,7 +1,8 @@
 """The one rule by which the data change how a log is read: the simplest hypothesis within one standard error.
 
 A hypothesis, such as a delay or another clock, is fitted without one stretch of time after the other, and scored by the
-logarithm of the likelihood that it gives to the torques left out, every joint with the noise that it had in the fit.
+logarithm of the likelihood that it gives to the torques left out, every joint with the noise that it had in the fit,
+or that it proved to have: a fit to little data is surer of itself than it should be, the better it fits the more.
 Of hypotheses in the order of their simplicity, the first is taken that is no worse than the best by more than one
 standard error of that difference over the stretches, and no worse than by a gain of practical size. Joints that no
 hypothesis explains have no vote.
@@ -56,9 +57,10 @@ class HeldOutScore:
 
     def by_stretch(self, voting: Mask) -> Array:
         """Mean logarithm of the likelihood of one equation in each stretch, joints weighted alike, shape (k,)."""
-        rows = np.maximum(self.count[:, voting], 1.0)
-        variance = np.maximum(self.variance[:, voting], np.finfo(np.float64).tiny)
-        return np.asarray(-0.5 * np.mean(self.energy[:, voting] / (rows * variance) + np.log(variance), axis=1))
+        rows, energy = np.maximum(self.count[:, voting], 1.0), self.energy[:, voting]
+        proved = np.maximum(energy.sum(axis=0) / rows.sum(axis=0), np.finfo(np.float64).tiny)
+        variance = np.maximum(self.variance[:, voting], proved)
+        return np.asarray(-0.5 * np.mean(energy / (rows * variance) + np.log(variance), axis=1))
 
     def size(self, voting: Mask) -> float:
         """Torque error, geometric mean over joints."""

@@ -11,7 +11,12 @@ from casysid.identification import Settings, identify
 from casysid.identification.passes import Passes
 from casysid.identification.tuning.band import choose_band
 from casysid.identification.tuning.candidates import gather_candidates
-from casysid.identification.tuning.clock import choose_clock, inertial_shares, split_moments
+from casysid.identification.tuning.clock import (
+    choose_clock,
+    has_placeholder_inertias,
+    inertial_shares,
+    split_moments,
+)
 from casysid.recording import Recording
 from casysid.simulation import design_sinusoids
 from tests.simulated import bundled_robot
@@ -135,3 +140,23 @@ def test_a_quasi_static_identification_leaves_rotors_at_the_file():
     assert result.drive_vector("armature") == pytest.approx(robot.armature, abs=2e-3)  # an interior point's rest
     assert result.train.relative < 0.1
     assert result.is_physically_consistent
+
+
+@pytest.mark.parametrize("inertia", ["identity", "of a hundredth"])
+@pytest.mark.parametrize("name", ["arm", "two_link"])
+def test_inertias_that_stand_for_none_leave_the_clock_alone(name, inertia):
+    """A file whose author wrote the same inertia for all bodies says nothing of time."""
+    robot, recording = recorded(name)
+    bodies = np.array(robot.inertial_parameters.reshape(-1, 10))
+    heavy = bodies[:, 0] > 0.0
+    mass, first = bodies[heavy, 0, None], bodies[heavy, 1:4]
+    centre = first / mass
+    moment = 1.0 if inertia == "identity" else 0.01
+    square = (centre**2).sum(axis=1)[:, None, None] * np.eye(3) - centre[:, :, None] * centre[:, None, :]
+    about_joint = moment * np.eye(3) + mass[:, :, None] * square
+    bodies[heavy, 4:] = about_joint[:, (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)]
+    placeholder = robot.with_parameters(inertial_parameters=bodies.ravel())
+    assert not has_placeholder_inertias(robot)
+    found = found_clock(placeholder, recording)
+    assert (found.scale, found.quasi_static, found.reason) == (1.0, False, "")
+    assert has_placeholder_inertias(placeholder) or heavy.sum() <= 2

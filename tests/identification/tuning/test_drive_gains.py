@@ -14,8 +14,11 @@ from tests.simulated import bundled_robot
 GAINS = np.array([0.8, 0.8, 0.8, 0.8, 1.25, 1.25, 1.25, 1.25, 1.0, 1.0])
 
 
-def arm_moments(seed, gains):
-    """Moments of an arm whose bodies are up to 20 % off its file's, torque noise 2 %, torques logged with gains."""
+def arm_moments(seed, gains, noise=0.02, unrelated=()):
+    """Moments of an arm whose bodies are up to 20 % off its file's, torque noise 2 %, torques logged with gains.
+
+    Torques of some joints may have nothing to do with the motion.
+    """
     robot, rng = bundled_robot("arm"), np.random.default_rng(seed)
     time = np.arange(0, 40.0, 0.02)
     motion = design_sinusoids(robot, duration=40.0, seed=seed, band=(0.1, 1.0)).sample(time)
@@ -25,7 +28,10 @@ def arm_moments(seed, gains):
         np.ones(len(regressor.names) - 10 * len(robot.links)),
     )
     tau = gains * regressor.predict(truth, motion.q, motion.v, motion.a)
-    tau = tau + 0.02 * tau.std(axis=0) * rng.normal(size=tau.shape)
+    tau = tau + noise * tau.std(axis=0) * rng.normal(size=tau.shape)
+    for joint in unrelated:
+        phase = rng.uniform(0.0, 2.0 * np.pi, 8)
+        tau[:, joint] = 5.0 * np.cos(time[:, None] * rng.uniform(1.0, 6.0, 8) + phase).sum(axis=1)
     return regressor, accumulate_moments(regressor, motion.q, motion.v, motion.a, tau, blocks=12)
 
 
@@ -72,3 +78,18 @@ def test_what_is_given_is_taken_and_nothing_is_fitted_where_nothing_binds_the_jo
     given = choose_drive_gains(moments, regressor.parameters, Consistency.FULL, given=tuple(GAINS))
     assert given.values == pytest.approx(GAINS)
     assert not choose_drive_gains(moments, regressor.parameters, None).found
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_unrelated_torques_of_three_joints_leave_the_gains_of_the_others_alone(seed):
+    regressor, moments = arm_moments(seed, np.ones(10), unrelated=(2, 5, 8))
+    found = choose_drive_gains(moments, regressor.parameters, Consistency.FULL)
+    others = np.delete(np.arange(10), (2, 5, 8))
+    assert found.values[others] == pytest.approx(1.0)
+
+
+def test_perfect_torques_get_no_gains():
+    regressor, moments = arm_moments(0, np.ones(10), noise=0.0)
+    found = choose_drive_gains(moments, regressor.parameters, Consistency.FULL)
+    assert not found.found
+    assert (found.values == 1.0).all()

@@ -91,5 +91,14 @@ def test_figures_of_a_score():
     assert one.explained == pytest.approx([0.99, 0.96, 0.75])
     everyone = np.ones(3, dtype=bool)
     assert one.size(everyone) == pytest.approx((500.0 * np.array([1.0, 4.0, 25.0])).prod() ** (1.0 / 6.0))
-    wanted = -0.5 * np.mean(np.array([1.0, 4.0, 25.0]) / 4.0 + np.log(4.0))
+    proved = np.array([4.0, 4.0, 25.0])
+    wanted = -0.5 * np.mean(np.array([1.0, 4.0, 25.0]) / proved + np.log(proved))
     assert one.by_stretch(everyone) == pytest.approx(wanted)
+
+
+@LAW
+@given(st.floats(0.1, 0.5), st.floats(1.0, 100.0))
+def test_a_fit_that_is_too_sure_of_itself_does_not_lose_by_it(factor, overconfidence):
+    """The better hypothesis fits the rest far better than it predicts, as with many parameters and little data."""
+    plain, better = score(1.0, variance=0.5), score(factor, variance=0.5 * factor**2 / overconfidence)
+    assert simplest_within_one_error([plain, better]) == 1
