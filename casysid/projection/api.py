@@ -108,7 +108,10 @@ def possible_parameters(
     @single_threaded()
     def nearest(estimate: Array, metric: Array, residual_energy: float) -> Array:
         task = task_of(problem, misfit_of_estimate(metric, estimate, residual_energy), prior)
-        certificate = certify(task, USUAL_WEIGHT)
+        try:
+            certificate = certify(task, USUAL_WEIGHT)
+        except SolverError:
+            certificate = None
         return estimate if certificate is None else task.frame.transform @ certificate.scaled
 
     return nearest

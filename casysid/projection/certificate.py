@@ -6,7 +6,8 @@ import dataclasses
 from dataclasses import dataclass
 
 from casysid.arrays import Array, frozen
-from casysid.projection.convex import solve_convex
+from casysid.errors import SolverError
+from casysid.projection.convex import ConvexOptimum, solve_convex
 from casysid.projection.objective import Objective, objective_of
 from casysid.projection.task import Task
 
@@ -61,7 +62,7 @@ def certify(task: Task, weight: float) -> Certificate | None:
     objective = objective_of(task.misfit, task.frame, weight)
     reference = task.frame.scaled_prior
     for _ in range(REFINEMENTS):
-        optimum = solve_convex(objective, task.cone, reference)
+        optimum = _optimum(objective, task, reference)
         if optimum is None:
             return None
         scaled = task.polished(optimum.scaled)
@@ -70,6 +71,23 @@ def certify(task: Task, weight: float) -> Certificate | None:
             return Certificate(objective, scaled, value, task.data_misfit(scaled))
         reference = optimum.scaled
     return None
+
+
+def _optimum(objective: Objective, task: Task, reference: Array) -> ConvexOptimum | None:
+    """What the convex solver finds; None where it fails, or holds a problem that has the prior's answer to have none."""
+    try:
+        return solve_convex(objective, task.cone, reference)
+    except SolverError:
+        if task.cone.contains(task.frame.scaled_prior):
+            return None
+        raise
+
+
+def rough_answer(task: Task) -> Array | None:
+    """A feasible point next to where the convex solver ends, however far above its bound; None without one."""
+    objective = objective_of(task.misfit, task.frame, USUAL_WEIGHT)
+    optimum = _optimum(objective, task, task.frame.scaled_prior)
+    return None if optimum is None else task.polished(optimum.scaled)
 
 
 def weigh_prior(task: Task) -> Certificate | None:

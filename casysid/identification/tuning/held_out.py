@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from casysid.arrays import Array
 from casysid.identification.tuning.log_score import HeldOutScore
@@ -61,8 +60,9 @@ class HeldOut:
 
     def _eliminate(self, square: Array) -> _Elimination:
         B, C = self._model, self._others
-        factor = cho_factor(square[B[:, None], B] + self._pull, lower=True)
-        Z = cho_solve(factor, square[B[:, None], C])
+        system = square[B[:, None], B] + self._pull
+        size = 1.0 / np.sqrt(np.diag(system))
+        Z = size[:, None] * np.linalg.solve(system * np.outer(size, size), size[:, None] * square[B[:, None], C])
         return _Elimination(Z, square[C[:, None], C] - square[C[:, None], B] @ Z)
 
     def score(self, columns: Sequence[int] = ()) -> HeldOutScore:
