@@ -11,7 +11,7 @@ from casysid.arrays import Array
 from casysid.errors import ParameterError, SolverError
 from casysid.moments import NormalEquations
 from casysid.nlp import Progress
-from casysid.projection.certificate import USUAL_WEIGHT, certify
+from casysid.projection.certificate import USUAL_WEIGHT, certify, rough_answer
 from casysid.projection.layout import as_vector
 from casysid.projection.misfit import misfit_of_equations, misfit_of_estimate
 from casysid.projection.problem import ProjectionProblem
@@ -112,6 +112,9 @@ def possible_parameters(
             certificate = certify(task, USUAL_WEIGHT)
         except SolverError:
             certificate = None
-        return estimate if certificate is None else task.frame.transform @ certificate.scaled
+        if certificate is not None:
+            return np.asarray(task.frame.transform @ certificate.scaled)
+        rough = rough_answer(task)
+        return estimate if rough is None else np.asarray(task.frame.transform @ rough)
 
     return nearest

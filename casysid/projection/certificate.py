@@ -74,7 +74,7 @@ def certify(task: Task, weight: float) -> Certificate | None:
 
 
 def _optimum(objective: Objective, task: Task, reference: Array) -> ConvexOptimum | None:
-    """What the convex solver finds; None where it fails, or holds a problem that has the prior's answer to have none."""
+    """What the convex solver finds; None where it fails, or says of a problem that the prior solves that nothing does."""
     try:
         return solve_convex(objective, task.cone, reference)
     except SolverError:
