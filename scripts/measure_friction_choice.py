@@ -3,7 +3,8 @@
     python scripts/measure_friction_choice.py [--robot head] [--seeds 5] [--recordings 2] [--share 0.1] [--json FILE]
 
 Every trial gives one joint, a different one for each seed, one kind of friction more than viscous, Coulomb, offset and
-armature; friction before sliding is part of the usual model and is not counted. Its torque is a share of the joint's whole; on top comes noise of the torque, part of it slow.
+armature. Its torque is a share of the joint's whole; on top comes noise of the torque, part of it slow. Friction before
+sliding is part of the usual model and is not counted.
 """
 
 from __future__ import annotations

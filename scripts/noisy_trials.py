@@ -74,7 +74,7 @@ class Trial:
         return float(np.linalg.norm(predicted - self.torque) / np.linalg.norm(self.torque - self.torque.mean(axis=0)))
 
     def error_of(self, result: IdentificationResult) -> float:
-        """The same of an identification; its Coulomb friction is judged with the true change of sign, as the rival's."""
+        """The same of an identification; its Coulomb friction changes sign as the true one, like the rival's."""
         found = result.regressor
         regressor = build_regressor(
             found.robot,

@@ -26,6 +26,8 @@ from casysid.signals import Motion, low_passed
 from casysid.threads import single_threaded
 
 SAMPLES, BLOCKS = 800, 12
+"""Samples of all recordings that are read anew for every reading, and contiguous blocks of them: a standard error of a
+mean over twelve is itself known to a fifth."""
 SHARPNESS = 0.01
 """Width of Coulomb friction's smooth sign in root mean square velocities."""
 RESOLUTION = 1e-4
@@ -40,7 +42,9 @@ NEARLY = 0.9
 USUAL_SCALE = 8.0
 """Between a file's masses and the truth lies no larger factor; beyond it the unit of torque is doubted."""
 MOST = 4
+"""Mistakes that are told of one log: who has made more reads the log anew after mending these."""
 DEGREE = np.pi / 180.0
+"""[rad]."""
 
 
 class MistakeKind(enum.Enum):

@@ -21,7 +21,8 @@ from casysid.identification.tuning.band import BandChoice
 from casysid.moments import Moments
 from casysid.recording import Source
 from casysid.robot import Robot
-from casysid.signals import BandAverage, Motion, motion_from_recording, motion_pieces
+from casysid.signals import BandAverage, Motion, motion_from_recording, motion_pieces, noise_of
+from casysid.signals.noise import smoothed_noise
 
 SAMPLES_PER_PERIOD = 100
 """Of the equations' cut-off: a boxcar of so many samples a period has a gain of ``1 - 1.6e-4`` there."""
@@ -112,6 +113,22 @@ class Passes:
         """Standard deviation of the position of each degree of freedom within a recording, shape (nv,)."""
         spread = [np.var(continued_positions(self.robot, motion.q), axis=0) for motion in self.sparse_motions]
         return np.asarray(np.sqrt(np.mean(spread, axis=0)))
+
+    @cached_property
+    def noise(self) -> Array:
+        """Standard deviation of what smoothing leaves of the positions' noise, shape (nv,).
+
+        Of joints with one channel, zero for others and without time.
+        """
+        found, cutoff = np.zeros(self.robot.nv), self.band.smoothing
+        if cutoff is None:
+            return found
+        left = [smoothed_noise(cutoff, one.rate, 0) * noise_of(one.spectrum) for one in self.recordings]
+        levels = np.sqrt(np.mean(np.square(left), axis=0))
+        for joint in self.robot.joints:
+            if joint.v.stop - joint.v.start == joint.channels.stop - joint.channels.start == 1:
+                found[joint.v] = levels[joint.channels]
+        return found
 
     @cached_property
     def width(self) -> Array:

@@ -10,8 +10,11 @@ from casysid.estimation import Status
 from casysid.identification.result import IdentificationResult
 
 WORTH_NAMING = 6
+"""Names in one sentence; of more, the number is told."""
 FAR_OFF = 3.0
+"""Factor between a mass that the data do not tell and the file's beyond which both are shown."""
 MUCH_WORSE, WORTH_A_REMARK = 1.5, 0.1
+"""Held-out error over the fitted one, and held-out error at least, for a remark; a judgement, nothing was measured."""
 
 
 @dataclass(frozen=True)

@@ -110,8 +110,9 @@ def cutoff_of(spectrum: PositionSpectrum, usual: float = np.inf) -> float:
     Noise is light where what passes of it is no more than a hundredth of the accelerations' energy in any channel.
     Else the cut-off is sought that leaves least error in the accelerations, the neediest channel's, up to the usual.
     A low-pass of gain ``g`` biases an inertia by ``b = Σ ω⁴ g (1 - g) S / Σ ω⁴ g² S`` for a motion with spectrum ``S``,
-    and leaves noise of ``r = Σ ω⁴ g² N / Σ ω⁴ S``, which averages out: the least of ``b² + r (1 + r) / n`` is sought
-    where ``b`` is small, n being what the samples are worth to a parameter. The less noise, the higher it is.
+    and leaves noise of ``r = Σ ω⁴ g² N / Σ ω⁴ S``, which attenuates the inertia by as much and scatters besides: the
+    least of ``b² + r² + r (1 + r) / n`` is sought where ``b`` is small, n being what the samples are worth to a
+    parameter. The less noise, the higher it is.
     """
     frequency, power, floor = spectrum.frequency, spectrum.power, _floor(spectrum)
     fourth = frequency[:, None] ** 4
@@ -130,7 +131,8 @@ def cutoff_of(spectrum: PositionSpectrum, usual: float = np.inf) -> float:
     gain = _gain(frequency, candidates)
     lost = (gain * (1.0 - gain)) @ motion[:, moving] / (gain**2 @ motion[:, moving])
     noise = passed(gain)
-    cost = np.where(lost < LARGEST_LOSS, lost**2 + noise * (1.0 + noise) / SAMPLES_PER_PARAMETER, np.inf)
+    scatter = noise * (1.0 + noise) / SAMPLES_PER_PARAMETER
+    cost = np.where(lost < LARGEST_LOSS, lost**2 + noise**2 + scatter, np.inf)
     best = candidates[np.argmin(cost, axis=0)].max(initial=candidates[0] if moving.any() else candidates[-1])
     return min(usual, float(best))
 

@@ -5,6 +5,10 @@ positions' energy, of all channels together. Noise has no vote (only lines of th
 nor has a joint that stands (its energy is nothing beside the others'). No torque error is looked at: a cut-off that is
 searched by it runs to where the error looks small, and adds its own scatter.
 
+Noise of the positions has a say in one way: where much of it would pass, it attenuates inertias by its share of the
+accelerations' energy. There the positions are smoothed at what leaves accelerations best
+(:func:`casysid.signals.cutoff_of`), and equations reach no further.
+
 Wide bands are safe where the equations near rest, whose friction turns round or has not broken loose, have a noise of
 their own, and where friction before sliding is part of the model.
 """
@@ -18,6 +22,7 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.recording import PositionSpectrum, Source
+from casysid.signals import cutoff_of
 
 ENERGY = 0.999
 """Share of the positions' energy that is motion: the rest is a thirtieth of its amplitude."""
@@ -43,17 +48,19 @@ class BandChoice:
         cutoff: Up to which equations are fitted and errors told [Hz]; None when samples are taken as logged.
         reason: In words.
         errors: Up to which errors are told, where a given cut-off is another [Hz].
+        noise_limit: Highest cut-off of the positions' smoothing that their noise allows [Hz].
     """
 
     motion_band: float
     cutoff: float | None
     reason: str
     errors: float | None = None
+    noise_limit: float = np.inf
 
     @property
     def smoothing(self) -> float | None:
         """Cut-off of the positions' smoothing [Hz]."""
-        return None if self.cutoff is None else SMOOTHING_IN_EQUATIONS * self.cutoff
+        return None if self.cutoff is None else min(SMOOTHING_IN_EQUATIONS * self.cutoff, self.noise_limit)
 
     def to_json(self) -> dict[str, object]:
         """Plain numbers and words."""
@@ -79,12 +86,22 @@ def choose_band(recordings: Sequence[Source], cutoff: float | None = None) -> Ba
     highest = HIGHEST_SHARE_OF_RATE * min(recording.rate for recording in recordings)
     lowest = min(LOWEST_PERIODS / max(recording.duration for recording in recordings), highest)
     derived = float(np.clip(EQUATIONS_IN_MOTION * motion, lowest, highest))
-    if cutoff is not None:
-        return BandChoice(motion, cutoff, "given", derived)
     words = f"{EQUATIONS_IN_MOTION:g} times the motion's band of {motion:.3g} Hz"
     if derived != EQUATIONS_IN_MOTION * motion:
         words = f"the nearest that rate and duration allow to {words}"
-    return BandChoice(motion, derived, words, derived)
+    limit = _noise_limit(recordings, derived)
+    if limit < derived:
+        derived, words = limit, f"where the positions' noise leaves accelerations best, below {words}"
+    if cutoff is not None:
+        return BandChoice(motion, cutoff, "given", derived, _noise_limit(recordings, cutoff))
+    return BandChoice(motion, derived, words, derived, limit)
+
+
+def _noise_limit(recordings: Sequence[Source], cutoff: float) -> float:
+    """Cut-off of the smoothing that is best for positions so noisy, inf where noise is light [Hz]."""
+    usual = SMOOTHING_IN_EQUATIONS * cutoff
+    limit = float(np.median([cutoff_of(recording.spectrum, usual) for recording in recordings]))
+    return limit if limit < usual else np.inf
 
 
 def motion_band(spectrum: PositionSpectrum) -> float:

@@ -16,9 +16,11 @@ from casysid.dynamics import (
     DriveState,
     FrictionColumn,
     FrictionKind,
+    LoadedCoulomb,
     MaxwellSlip,
     Parameter,
     Regressor,
+    SharpCoulomb,
     build_regressor,
     extend_regressor,
     with_width,
@@ -32,6 +34,10 @@ from casysid.moments import Indices, Moments
 DISPLACEMENTS = (0.0003, 0.003, 0.03, 0.3)
 """Of the elements of friction before sliding, in standard deviations of the position: decades below the travel, down to
 where an element turns as sharply as a step, at the reversal of the position and not of a smoothed velocity."""
+SHARPER = 10.0
+"""Width of the usual smooth sign over that of the sharp one: a decade, as between the displacements."""
+CLEAR_OF_NOISE = 3.0
+"""Standard deviations of the smoothed positions' noise that an element must be wide: a narrower one turns with it."""
 
 
 @dataclass(frozen=True)
@@ -79,17 +85,28 @@ class Candidates:
 
 
 def usual_friction(passes: Passes, settings: Settings) -> tuple[FrictionKind, ...]:
-    """The friction asked for, as sharp as the motions allow; with friction before sliding if the data may choose."""
+    """The friction asked for; and where the data may choose, sharp and loaded dry friction and that before sliding.
+
+    These cost next to nothing where they are not, since an estimator that weighs groups leaves a whole kind out.
+    """
     width: Any = settings.coulomb_width or tuple(passes.width.tolist())
     friction = with_width(settings.friction, width)
-    if passes.band.cutoff is None or not settings.choose_friction or MaxwellSlip.kind in [one.kind for one in friction]:
+    if passes.band.cutoff is None or not settings.choose_friction:
         return friction
-    displacements = {
-        direction.name: tuple(share * passes.travel[dof] for share in DISPLACEMENTS)
-        for dof, direction in joint_directions(passes.robot).items()
-        if passes.travel[dof] > 0.0 and dof in _single(passes)
+    directions, single, smallest = joint_directions(passes.robot), _single(passes), CLEAR_OF_NOISE * passes.noise
+    clear = {
+        directions[dof].name: [
+            share * passes.travel[dof] for share in DISPLACEMENTS if share * passes.travel[dof] > smallest[dof]
+        ]
+        for dof in directions
+        if dof in single
     }
-    return (*friction, MaxwellSlip(displacements)) if displacements else friction
+    displacements = {name: tuple(several) for name, several in clear.items() if several}
+    usual: list[FrictionKind] = [SharpCoulomb(tuple((passes.width / SHARPER).tolist())), LoadedCoulomb(width)]
+    if displacements:
+        usual.append(MaxwellSlip(displacements))
+    there = [one.kind for one in friction]
+    return (*friction, *(one for one in usual if one.kind not in there))
 
 
 def gather_candidates(passes: Passes, settings: Settings) -> Candidates:

@@ -22,8 +22,10 @@ from casysid.signals import BandAverage, Motion
 from casysid.threads import single_threaded
 
 NODES = 13
+"""Of the torque's delay: with their spacing they span 1.2 periods of the cut-off; they follow a delay
+that runs away."""
 NODE_SPACING = 0.1
-"""In periods of the cut-off."""
+"""In periods of the cut-off: a fifth of what the sampling theorem allows, so that a polynomial does between nodes."""
 FULL_WINDOW = 0.9
 """A window with less than this share of the usual weight, of motion or of torque, is left out."""
 SAMPLES_PER_PERIOD = 20

@@ -24,7 +24,7 @@ from casysid.errors import SolverError
 from casysid.estimation import Ridge
 from casysid.estimation.cross_validation import contiguous_folds
 from casysid.identification.tuning.held_out import FOLDS
-from casysid.identification.tuning.log_score import EXPLAINED, HeldOutScore, simplest_within_one_error
+from casysid.identification.tuning.log_score import EXPLAINED, PRACTICAL_GAIN, HeldOutScore, simplest_within_one_error
 from casysid.inertia import Consistency
 from casysid.moments import Indices, Moments, NormalEquations
 from casysid.projection import (
@@ -115,9 +115,10 @@ def _search(
     fit = _GainFit(moments.joints, tuple(parameters), consistency, tuple(knowledge), weights)
     if (weights > 0.0).sum() < 2 or not fit.is_suspicious(moments):
         return no_gains(dofs)
-    gains, _ = fit.gains(moments)
+    gains, with_them = fit.gains(moments)
     voting = weights > 0.0
-    if np.abs(gains[voting] - 1.0).max() < SMALLEST:
+    fitted = fit.error(scaled(moments, gains), with_them) / fit.error(moments, fit.consistent(moments))
+    if np.abs(gains[voting] - 1.0).max() < SMALLEST or fitted > 1.0 - PRACTICAL_GAIN:
         return no_gains(dofs)
     folds = contiguous_folds(moments.blocks, FOLDS)
     values, without, with_gains = [], [], []

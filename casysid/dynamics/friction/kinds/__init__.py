@@ -13,6 +13,7 @@ from casysid.dynamics.friction.kinds.offset import Offset
 from casysid.dynamics.friction.kinds.power_viscous import PowerViscous
 from casysid.dynamics.friction.kinds.random_features import RandomFeatures
 from casysid.dynamics.friction.kinds.ripple import Ripple
+from casysid.dynamics.friction.kinds.sharp_coulomb import SharpCoulomb
 from casysid.dynamics.friction.kinds.spring import Spring
 from casysid.dynamics.friction.kinds.stribeck import Stribeck
 from casysid.dynamics.friction.kinds.viscous import Viscous
@@ -21,7 +22,7 @@ DEFAULT_FRICTION: tuple[FrictionKind, ...] = (Viscous(), Coulomb(), Offset(), Ar
 FRICTION_KINDS: tuple[type[FrictionKind], ...] = (
     Viscous, Coulomb, Offset, Armature,
     AsymmetricViscous, Stribeck, PowerViscous, LoadedCoulomb, Spring, Counterweight, Ripple, CoulombRipple,
-    MaxwellSlip, Drift, RandomFeatures,
+    MaxwellSlip, SharpCoulomb, Drift, RandomFeatures,
 )  # fmt: skip
 """All that files may hold, in the order in which candidates are proposed."""
 PHYSICAL_KINDS = tuple(kind for kind in FRICTION_KINDS if kind.is_physical)
@@ -43,6 +44,7 @@ __all__ = [
     "PowerViscous",
     "RandomFeatures",
     "Ripple",
+    "SharpCoulomb",
     "Spring",
     "Stribeck",
     "Viscous",
