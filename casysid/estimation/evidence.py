@@ -36,6 +36,9 @@ SEEN = 1e-4
 """Directions of less information than this share of the strongest have no say in ``κ``: their scores are rounding."""
 SIZES = (1e-6, 1e6)
 """Of ``λ``, squares of a relative deviation: a thousandth is below what any torque sensor shows, a thousand is open."""
+LEAST_DOUBT = 1e-6
+"""Of a body's parameter, in squares of what would explain a joint's torque alone: a file in wrong units is not believed
+to better than a thousandth of the torque."""
 VARIANCE_FLOOR = 1e-10
 """Of ``σ²`` over the mean square of the target: perfect data end there."""
 CAREFUL_ROUNDS = 3
@@ -265,9 +268,10 @@ def _shape(shifted: Moments, centre: Array) -> Array:
         there = energy[:-1] > 0.0
         alone = np.sqrt(energy[-1] / np.where(there, energy[:-1], np.inf))
         reach[own] = np.maximum(reach[own], alone)
-    K = np.diag(np.where(reach > 0.0, reach, reach.max(initial=0.0) or 1.0) ** 2)
+    open_size = np.where(reach > 0.0, reach, reach.max(initial=0.0) or 1.0) ** 2
+    K = np.diag(open_size)
     links = [link for link in links_among(shifted.columns) if centre[link.start] > 0.0]
     bodies = relative_covariance(np.array([centre[link] for link in links]).reshape(-1, len(KINDS)))
     for link, covariance in zip(links, bodies, strict=True):
-        K[link, link] = covariance
+        K[link, link] = covariance + LEAST_DOUBT * np.diag(open_size[link])
     return K

@@ -12,7 +12,7 @@ from casysid.arrays import Array
 from casysid.errors import CasysidWarning, SolverError
 from casysid.inertia import smallest_eigenvalue
 from casysid.nlp import NlpIteration, NlpSolution, NlpStatus, Progress, solve_nlp
-from casysid.projection.certificate import USUAL_WEIGHT, Certificate, feasible_answer, weigh_prior
+from casysid.projection.certificate import USUAL_WEIGHT, Certificate, weigh_prior
 from casysid.projection.frame import UNIT_BODY
 from casysid.projection.objective import SCALE, Objective, objective_of
 from casysid.projection.results import ProjectionResult, ProjectionStatus, Solver
@@ -40,8 +40,6 @@ def solve_task(task: Task, progress: Progress | None) -> ProjectionResult:
         return _result(task, task.polished(estimate), ProjectionStatus.UNCHANGED, Solver.NONE, None, math.nan, 0, began)
     certificate = weigh_prior(task)
     local, iterations = _solve_locally(task, certificate, progress)
-    if local is None and certificate is None:
-        local = feasible_answer(task)
     scaled, status, solver = _choose(local, certificate)
     if status is not ProjectionStatus.CERTIFIED:
         warnings.warn(f"projection: {status.value}", CasysidWarning, stacklevel=4)
