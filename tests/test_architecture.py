@@ -58,7 +58,7 @@ def test_imports_go_one_way(path):
             assert LEVEL[parts[1]] <= own, f"{path.name} imports {module}, which comes after it"
 
 
-@pytest.mark.parametrize("rooms", [("recording", "readers")])
+@pytest.mark.parametrize("rooms", [("recording", "readers"), ("identification",), ("estimation",)])
 def test_no_file_imports_itself_through_others(rooms):
     files = {".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): path for path in FILES}
     inside = {name: path for name, path in files.items() if room_of(path) in rooms}
@@ -74,6 +74,18 @@ def typed_only(path: Path) -> set[str]:
         if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
     ]
     return {node.module for guard in guards for node in guard.body if isinstance(node, ast.ImportFrom) and node.module}
+
+
+def test_choices_know_nothing_of_the_pipeline_that_asks_for_them():
+    """What is chosen from the data is chosen from settings and passes, whoever asks."""
+    room = PACKAGE / "identification"
+    callers = {path.stem for path in room.glob("*.py") if path.stem != "__init__"} & {
+        "choices", "comparison", "links", "output", "pipeline", "prediction", "result", "sources", "verdict",
+    }  # fmt: skip
+    forbidden = {"casysid.identification", *(f"casysid.identification.{caller}" for caller in callers)}
+    assert len(callers) == 9
+    for path in (room / "tuning").glob("*.py"):
+        assert not imported_modules(path) & forbidden, path.name
 
 
 @pytest.mark.parametrize(

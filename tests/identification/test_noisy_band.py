@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from casysid.bundled import find_model
 from casysid.dynamics import MaxwellSlip
-from casysid.estimation import EmpiricalBayes, ErrorsInVariables
 from casysid.identification import Settings, choose_band
 from casysid.identification.passes import Passes
-from casysid.identification.tuning.candidates import usual_friction
+from casysid.identification.tuning.candidates import CLEAR_OF_NOISE, DISPLACEMENTS, usual_friction
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.signals import cutoff_of
+from casysid.signals.noise import smoothed_noise
 
 RATE = 200.0
 
@@ -60,15 +60,17 @@ def test_one_noisy_recording_among_three_has_no_majority():
     assert choose_band([loud, quiet, loud]).noise_limit < np.inf
 
 
-@pytest.mark.parametrize(("noise", "slips"), [(1e-6, True), (0.1, False)])
-def test_noise_is_only_taken_out_where_friction_before_sliding_is_larger(noise, slips):
+@pytest.mark.parametrize(("noise", "kept"), [(1e-6, len(DISPLACEMENTS)), (1e-2, 2), (0.1, 1)])
+def test_elements_of_friction_before_sliding_that_are_narrower_than_the_noise_are_left_out(noise, kept):
     robot = Robot.from_file(find_model("two_link.urdf"))
     time = np.arange(2000) / RATE
     position = np.sin(2.0 * np.pi * np.array([0.5, 0.7]) * time[:, None])
     position = position + noise * np.random.default_rng(0).normal(size=position.shape)
     log = Recording(channels=robot.channels, dofs=robot.dofs, time=time, position=position, torque=position)
     passes = Passes(robot, [log], choose_band([log]))
-    assert passes.noise == pytest.approx(noise, rel=0.2)
-    for method, expected in ((ErrorsInVariables(), slips), (EmpiricalBayes(), True)):
-        kinds = [kind.kind for kind in usual_friction(passes, Settings(method=method))]
-        assert (MaxwellSlip.kind in kinds) == expected
+    left = smoothed_noise(passes.band.smoothing, RATE, 0)
+    assert passes.noise == pytest.approx(left * noise, rel=0.2)
+    (slip,) = (kind for kind in usual_friction(passes, Settings()) if kind.kind == MaxwellSlip.kind)
+    for dof, name in enumerate(robot.dofs):
+        assert min(slip.displacements[name]) > CLEAR_OF_NOISE * passes.noise[dof]
+        assert len(slip.displacements[name]) == kept

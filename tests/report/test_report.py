@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from casysid.estimation import ErrorsInVariables
 from casysid.identification import Settings, identify
 from casysid.report import drive_table, error_table, link_table, noise_table, render_report, write_report
 from casysid.report.overview import robot_tables
@@ -24,7 +23,7 @@ UNIT = {JointKind.REVOLUTE: "N m", JointKind.PRISMATIC: "N"}
 @pytest.fixture(scope="module")
 def result():
     runs = [simulated_run("two_link", seed, PlantSettings()).recording for seed in (0, 1)]
-    settings = Settings(method=ErrorsInVariables(), cutoff=20.0, coulomb_width=0.02, delay=0.0, choose_friction=False)
+    settings = Settings(cutoff=20.0, coulomb_width=0.02, delay=0.0, choose_friction=False)
     return identify(bundled_robot("two_link"), runs[0], settings, held_out=runs[1:])
 
 
