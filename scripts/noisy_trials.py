@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +16,7 @@ import numpy as np
 from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
 from casysid.bundled import find_model
-from casysid.dynamics import DEFAULT_FRICTION, Coulomb, FrictionKind, Regressor, build_regressor, with_width
+from casysid.dynamics import DEFAULT_FRICTION, Coulomb, Regressor, build_regressor, with_width
 from casysid.estimation import WeightedLeastSquares
 from casysid.identification import IdentificationResult, Settings, choose_band
 from casysid.identification.noise_moments import with_noise
@@ -74,21 +73,18 @@ class Trial:
         return float(np.linalg.norm(predicted - self.torque) / np.linalg.norm(self.torque - self.torque.mean(axis=0)))
 
     def error_of(self, result: IdentificationResult) -> float:
-        """The same of an identification; its Coulomb friction changes sign as the true one, like the rival's."""
+        """The same of an identification; friction of the true kinds is judged with the true change of sign."""
         found = result.regressor
+        if result.friction.chosen:
+            return self.error(result.parameters, found)
         regressor = build_regressor(
             found.robot,
-            friction=as_sharp_as_true(found.friction),
+            friction=with_width(found.friction, TRUE_WIDTH),
             couplings=found.couplings,
             quasi_static=result.choices.clock.quasi_static,
             torque_gains=result.choices.settings.torque_gains,
         )
         return self.error(result.parameters, regressor)
-
-
-def as_sharp_as_true(friction: Sequence[FrictionKind]) -> tuple[FrictionKind, ...]:
-    """The same kinds, Coulomb friction with the true change of sign."""
-    return tuple(Coulomb(TRUE_WIDTH) if isinstance(kind, Coulomb) else kind for kind in friction)
 
 
 def load_robot(name: str) -> Robot:
@@ -110,7 +106,7 @@ def make_trial(
         delay: By how much the torques are logged late [s].
     """
     robot = load_robot(name)
-    regressor = build_regressor(robot, friction=as_sharp_as_true(DEFAULT_FRICTION))
+    regressor = build_regressor(robot, friction=with_width(DEFAULT_FRICTION, TRUE_WIDTH))
     truth = hidden_truth(robot, Mechanics(), seed)
     time = np.arange(int(duration * RATE)) / RATE
     with warnings.catch_warnings():

@@ -105,7 +105,7 @@ def ratio(ours, other):
         names = [name for name in ours if name in other]
         ours, other = [ours[name] for name in names], [other[name] for name in names]
     ours, other = np.atleast_1d(ours), np.atleast_1d(other)
-    known = np.isfinite(ours) & np.isfinite(other)
+    known = np.isfinite(ours) & np.isfinite(other) & (ours > 0.0) & (other > 0.0)  # laws hold some at zero exactly
     return float(np.exp(np.mean(np.log(ours[known] / other[known]))))
 
 

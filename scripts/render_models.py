@@ -5,8 +5,8 @@ Needs PyOpenGL, Pillow and EGL (or OSMesa: set ``MUJOCO_GL=osmesa``). Run ``pyth
 
 from __future__ import annotations
 
+import argparse
 import os
-import sys
 
 os.environ.setdefault("MUJOCO_GL", "egl")
 
@@ -58,5 +58,7 @@ def render(machine: Machine) -> None:
 
 
 if __name__ == "__main__":
-    for name in sys.argv[1:] or sorted(path.stem for path in TABLES.glob("*.toml")):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", help="bundled models; default: all")
+    for name in parser.parse_args().names or sorted(path.stem for path in TABLES.glob("*.toml")):
         render(Machine.read(TABLES / f"{name}.toml"))
