@@ -74,7 +74,7 @@ def certify(task: Task, weight: float) -> Certificate | None:
 
 
 def _optimum(objective: Objective, task: Task, reference: Array) -> ConvexOptimum | None:
-    """What the convex solver finds; None where it fails, or says of a problem that the prior solves that nothing does."""
+    """What the convex solver finds; None where it fails, also where it denies an answer that the prior is."""
     try:
         return solve_convex(objective, task.cone, reference)
     except SolverError:
