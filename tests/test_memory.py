@@ -1,7 +1,5 @@
 """What does not fit into memory is refused before it is asked for."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -9,8 +7,6 @@ from casysid import identifiability, memory
 from casysid.accumulation import accumulate_moments
 from casysid.dynamics import build_regressor
 from casysid.errors import ParameterError
-from casysid.estimation.errors_in_variables import limit_noise
-from casysid.moments import Moments
 from tests.simulated import bundled_robot
 
 
@@ -34,18 +30,6 @@ def test_moments_too_large_for_the_machine_are_refused(monkeypatch):
     monkeypatch.setattr(memory, "memory_limit", lambda: 0.99 * wanted)
     with pytest.raises(ParameterError, match=r"2 joints, \d+ columns and 5 blocks takes about .* GB .* fewer blocks"):
         accumulate_moments(regressor, *samples, blocks=5)
-
-
-def test_heavy_noise_at_too_many_joints_is_refused(monkeypatch):
-    rng = np.random.default_rng(0)
-    x = rng.normal(size=(400, 3))
-    moments = Moments.from_rows(x, x.sum(axis=1) + rng.normal(size=400), blocks=4)
-    noise = (np.array(moments.squares[0]) * np.diag([1.5, 0.0, 0.0, 0.0]),)  # more than there is
-    heavy = dataclasses.replace(moments, noise=noise)
-    assert limit_noise(heavy, 0.95).directions == 1
-    monkeypatch.setattr(memory, "memory_limit", lambda: 1000.0)
-    with pytest.raises(ParameterError, match=r"noise as heavy as this at 1 joints .* Take method ridge"):
-        limit_noise(heavy, 0.95)
 
 
 def test_base_parameters_of_too_many_columns_are_refused(monkeypatch):

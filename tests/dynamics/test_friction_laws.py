@@ -22,6 +22,7 @@ from casysid.dynamics import (
     PowerViscous,
     RandomFeatures,
     Ripple,
+    SharpCoulomb,
     Spring,
     Stribeck,
     Viscous,
@@ -47,6 +48,7 @@ EXAMPLES = (
     Ripple({"joint_1": (3.0, 17.25)}),
     CoulombRipple({"joint_1": (3.0,), "joint_3": (2.0, 5.5)}, 0.1),
     MaxwellSlip({"joint_2": (0.01, 0.1)}),
+    SharpCoulomb(0.01),
     Drift(0.1, ("joint_3",)),
     RandomFeatures(2, (1.0, None, (1.0, 2.0, 3.0)), 5, ("joint_1",)),
 )
