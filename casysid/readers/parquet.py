@@ -46,7 +46,8 @@ class ParquetTable:
             with parquet.ParquetFile(self.path, buffer_size=BUFFER, pre_buffer=False) as file:
                 for name in names:
                     self._refuse_no_numbers(name, file.schema_arrow.field(name).type)
-                check_ratio(*_sizes(file.metadata, frozenset(names)))
+                # sizes of columns in the metadata are not asked: Arrow 26 ends the process where their statistics lie
+                check_ratio(self.path.stat().st_size, 8 * file.metadata.num_rows * len(names))
                 groups, skipped = _groups_from(file.metadata, first)
                 read = file.iter_batches(BATCH, row_groups=groups, columns=list(names), use_threads=False)
                 yield from from_row((_numbers(batch, names) for batch in read), skipped)
@@ -86,16 +87,6 @@ def _groups_from(metadata: Any, first: int) -> tuple[list[int], int]:
     ends = np.cumsum(rows)
     groups = np.flatnonzero(ends > first).tolist()
     return groups, first - (int(ends[groups[0]]) - rows[groups[0]]) if groups else 0
-
-
-def _sizes(metadata: Any, names: frozenset[str]) -> tuple[int, int]:
-    """Bytes of some columns in the file, and as float64."""
-    packed = 0
-    for group in range(metadata.num_row_groups):
-        row_group = metadata.row_group(group)
-        chunks = (row_group.column(k) for k in range(row_group.num_columns))
-        packed += sum(max(chunk.total_compressed_size, 0) for chunk in chunks if chunk.path_in_schema in names)
-    return packed, 8 * metadata.num_rows * len(names)
 
 
 def open_parquet(path: Path) -> ParquetTable:

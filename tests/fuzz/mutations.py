@@ -5,7 +5,7 @@ import json
 import random
 import re
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 Mutation = Callable[[bytes, bytes, random.Random], bytes]
 """Of a file, with another of its kind at hand."""
@@ -90,11 +90,16 @@ def archive(data: bytes, other: bytes, rng: random.Random) -> bytes:
             content = blind(content, other, rng)
             header, body = content[:128], content[128:]
     members[name] = header + body
-    stream = io.BytesIO()
     kinds = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
-    with zipfile.ZipFile(stream, "w", rng.choice(kinds)) as packed:
-        for key, value in members.items():
-            packed.writestr(key, value)
+    return zip_of(members, rng.choice(kinds))
+
+
+def zip_of(members: Mapping[str, bytes], compression: int) -> bytes:
+    """A ZIP archive that is the same every time: its clock stands."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as packed:
+        for name, content in members.items():
+            packed.writestr(zipfile.ZipInfo(name), content, compression)
     return stream.getvalue()
 
 

@@ -6,6 +6,7 @@ import io
 import json
 import shlex
 import warnings
+import zipfile
 import zlib
 from collections.abc import Callable
 from functools import cache
@@ -61,9 +62,12 @@ def text_of(log: dict[str, np.ndarray], delimiter: str = ",") -> bytes:
 
 
 def npz_of(log: dict[str, np.ndarray], *, packed: bool = False) -> bytes:
-    stream = io.BytesIO()
-    (np.savez_compressed if packed else np.savez)(stream, **log)  # type: ignore[arg-type]
-    return stream.getvalue()
+    members = {}
+    for name, values in log.items():
+        stream = io.BytesIO()
+        np.lib.format.write_array(stream, values)
+        members[f"{name}.npy"] = stream.getvalue()
+    return mutations.zip_of(members, zipfile.ZIP_DEFLATED if packed else zipfile.ZIP_STORED)
 
 
 def parquet_of(log: dict[str, np.ndarray], **options: object) -> bytes:
