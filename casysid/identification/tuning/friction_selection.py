@@ -35,6 +35,8 @@ MOST = 30
 """Kinds that may join: more than any robot's drives have."""
 CLEARLY_BROKEN = 2.0
 """Standard errors by which a law of other columns must be missed to keep a candidate out: the fit to come holds it."""
+ROUNDS = 12
+"""Of each fit on the way: past the cautious ones and two inflations of the scores; the last fit takes what it needs."""
 AT_ZERO = 1e-7
 """A coefficient below this share of the largest is zero to the convex solver."""
 
@@ -201,7 +203,7 @@ def fit_model(candidates: Candidates, model: Indices, settings: Settings) -> Est
         knowledge=(*settings.knowledge, *_laws_of(candidates.regressor, parameters)),
     )
     moments = candidates.moments.select_columns(model)
-    method = EmpiricalBayes(standard_errors=False)
+    method = EmpiricalBayes(standard_errors=False, iterations=ROUNDS)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CasysidWarning)  # of an inconsistent model file: the answer's projection warns
         return method.estimate_among(moments, prior, possible_parameters(problem, prior))
