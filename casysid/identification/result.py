@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from casysid.arrays import Array
-from casysid.dynamics import Regressor
+from casysid.dynamics import Coulomb, MaxwellSlip, Regressor, SharpCoulomb
 from casysid.estimation import Estimate, Status
 from casysid.identifiability import BaseParameters
 from casysid.identification.choices import Choices
@@ -35,6 +35,11 @@ from casysid.signals import InputNoise, Motion
 from casysid.uncertainty import ParameterUncertainty
 
 JOINT_KINDS = ("viscous", "coulomb", "offset", "armature")
+
+
+def is_dry(kind: str) -> bool:
+    """Whether a parameter's kind is dry friction that does not depend on load or position."""
+    return kind in (Coulomb.kind, SharpCoulomb.kind) or kind.startswith(MaxwellSlip.kind)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -203,6 +208,18 @@ class IdentificationResult:
             table.setdefault(parameter.owner, {})[parameter.kind] = float(value)
         return table
 
+    def dry_friction(self) -> dict[str, float | None]:
+        """All dry friction of each degree of freedom and coupling once it slides, but for that of the load [N m, N].
+
+        The sum of blunt and sharp Coulomb friction and of what every element of friction before sliding slides at.
+        """
+        table = self.drive_parameters()
+        dry = {owner: [row[kind] for kind in row if is_dry(kind)] for owner, row in table.items()}
+        return {
+            owner: sum(value for value in several if value is not None) if any(v is not None for v in several) else None
+            for owner, several in dry.items()
+        }
+
     def drive_vector(self, kind: str) -> Array:
         """One kind of drive parameter by degree of freedom, shape (nv,); zero where the model has none."""
         table = self.drive_parameters()
@@ -247,6 +264,7 @@ class IdentificationResult:
             },
             "links": {link.name: link.to_json() for link in self.links()},
             "friction": self.drive_parameters(),
+            "dry_friction": self.dry_friction(),
             "friction_std": self.drive_std(),
             "friction_decided_by_data": self._by_drive(self.sources.by_data),
             "decided_by_the_file": list(self.sources.of_the_file),

@@ -6,10 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from casysid.dynamics import Coulomb
 from casysid.dynamics.friction import force_unit, joint_directions
 from casysid.identification import IdentificationResult
 from casysid.identification.mistakes import Mistake
-from casysid.identification.result import JOINT_KINDS
+from casysid.identification.result import JOINT_KINDS, is_dry
 from casysid.inertia import KINDS
 from casysid.robot import Robot
 
@@ -131,12 +132,16 @@ def _range(shares: list[float]) -> str:
 
 
 def drive_table(result: IdentificationResult) -> Table:
-    """Friction, offset and armature by joint and coupling."""
-    table = result.drive_parameters()
-    kinds = [kind for kind in JOINT_KINDS if any(row.get(kind) is not None for row in table.values())]
-    kinds += sorted({kind for row in table.values() for kind in row} - set(JOINT_KINDS))
-    rows = tuple((owner, *(number(row.get(kind)) for kind in kinds)) for owner, row in table.items())
-    return Table(("joint", *kinds), rows)
+    """Friction, offset and armature by joint and coupling; all dry friction as one number."""
+    table, dry = result.drive_parameters(), result.dry_friction()
+    there = {kind for row in table.values() for kind, value in row.items() if value is not None}
+    others = sorted(kind for kind in there - set(JOINT_KINDS) if not is_dry(kind))
+    usual = [kind for kind in JOINT_KINDS if kind in there and kind != Coulomb.kind]
+    rows = tuple(
+        (owner, number(dry[owner]), *(number(row.get(kind)) for kind in (*usual, *others)))
+        for owner, row in table.items()
+    )
+    return Table(("joint", "dry", *usual, *others), rows)
 
 
 def choice_table(result: IdentificationResult) -> Table:
