@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from casysid.arrays import Array, frozen
-from casysid.dynamics import Regressor, build_regressor
+from casysid.dynamics import Coulomb, Regressor, build_regressor
 from casysid.estimation.covariance import block_covariance
 from casysid.identification import IdentificationResult
+from casysid.identification.result import is_dry
 from casysid.simulation import Plant, SimulatedRun
 from casysid.threads import single_threaded
 
@@ -82,10 +83,21 @@ def compare_base_parameters(result: IdentificationResult, plant: Plant) -> BaseC
         names=base.words(),
         true=base.transform @ true_coefficients(plant, regressor),
         file=base.transform @ regressor.prior,
-        identified=base.transform @ result.parameters,
+        identified=base.transform @ _dry_friction_together(regressor, result.parameters),
         std=np.sqrt(np.diag(block_covariance(leading, fitted, weights))),
         torque=np.sqrt(energy),
     )
+
+
+def _dry_friction_together(regressor: Regressor, parameters: Array) -> Array:
+    """Parameters with all dry friction of a joint in Coulomb's, as the plant has it: one once it slides."""
+    together = np.array(parameters)
+    coulomb = {one.owner: k for k, one in enumerate(regressor.parameters) if one.kind == Coulomb.kind}
+    for k, one in enumerate(regressor.parameters):
+        if is_dry(one.kind) and k != coulomb.get(one.owner, k):
+            together[coulomb[one.owner]] += together[k]
+            together[k] = 0.0
+    return together
 
 
 @single_threaded()
