@@ -30,7 +30,7 @@ from casysid.identification.tuning.delay import choose_delay
 from casysid.identification.tuning.drive_gains import choose_drive_gains
 from casysid.identification.tuning.friction_selection import FrictionChoice, select_friction
 from casysid.moments import Moments
-from casysid.projection import ProjectionProblem, ProjectionResult, build_projection, possible_parameters, project
+from casysid.projection import PossibleParameters, ProjectionProblem, ProjectionResult, build_projection, project
 from casysid.recording import Source
 from casysid.robot import Robot
 from casysid.signals import InputNoise, Motion
@@ -182,7 +182,7 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
     if problem is None:
         estimate = settings.method.estimate(moments, prior)
     else:
-        estimate = settings.method.estimate_among(moments, prior, possible_parameters(problem, prior))
+        estimate = settings.method.estimate_among(moments, prior, PossibleParameters(problem, prior))
     clock.lap("estimate")
     progress("estimate", 1.0)
     progress("projection", 0.0)
