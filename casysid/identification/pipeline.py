@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.dynamics import Regressor
+from casysid.dynamics import JointUse, Regressor
 from casysid.errors import CasysidWarning, RecordingError
 from casysid.estimation import Estimate
 from casysid.identifiability import BaseParameters, excited_base_parameters, structural_base_parameters
@@ -28,7 +28,8 @@ from casysid.identification.tuning.candidates import Candidates, final_regressor
 from casysid.identification.tuning.clock import choose_clock
 from casysid.identification.tuning.delay import choose_delay
 from casysid.identification.tuning.drive_gains import choose_drive_gains
-from casysid.identification.tuning.friction_selection import FrictionChoice, select_friction
+from casysid.identification.tuning.friction_selection import FrictionChoice, fit_model, select_friction
+from casysid.identification.tuning.ripples import ripple_uses
 from casysid.moments import Moments
 from casysid.projection import PossibleParameters, ProjectionProblem, ProjectionResult, build_projection, project
 from casysid.recording import Source
@@ -279,11 +280,13 @@ def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, prog
         warnings.warn(mistake.sentence, CasysidWarning, stacklevel=4)
     progress("tuning", 0.5)
     delay = choose_delay(passes, candidates.base, settings.delay)
-    if not delay.is_none:
-        passes, candidates = _gather(robot, recordings, band, settings, delay.seconds)
+    usual = fit_model(candidates, candidates.model(), settings) if candidates.proposals else None
+    uses = None if usual is None else ripple_uses(passes, candidates, usual)
+    if uses or not delay.is_none:
+        passes, candidates = _gather(robot, recordings, band, settings, delay.seconds, uses)
         work.append(passes)
     progress("tuning", 0.7)
-    friction = select_friction(candidates, settings) if candidates.proposals else FrictionChoice(settings)
+    friction = select_friction(candidates, settings, usual) if usual else FrictionChoice(settings)
     regressor = final_regressor(candidates, settings, [proposal for proposal, _ in friction.taken])
     moments = moments_of(regressor, candidates, friction.taken)
     gains = choose_drive_gains(
@@ -320,10 +323,15 @@ def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, prog
 
 
 def _gather(
-    robot: Robot, recordings: Sequence[Source], band: BandChoice, settings: Settings, delays: Array | None = None
+    robot: Robot,
+    recordings: Sequence[Source],
+    band: BandChoice,
+    settings: Settings,
+    delays: Array | None = None,
+    uses: Mapping[int, JointUse] | None = None,
 ) -> tuple[Passes, Candidates]:
     passes = Passes(robot, recordings, band, delays=delays, blocks=settings.blocks, threads=settings.threads)
-    return passes, gather_candidates(passes, settings)
+    return passes, gather_candidates(passes, settings, uses)
 
 
 class _Clock:
