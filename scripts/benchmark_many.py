@@ -29,6 +29,8 @@ from casysid.simulation import design_sinusoids
 RATE = 200.0
 NOISE = 0.02
 """Of the torque, as a share of its standard deviation."""
+SENSOR = 1e-4
+"""Noise of the positions [rad]: an encoder of 16 bits."""
 SPREAD = 0.1
 """Of the machines' viscous friction about the usual one, as a share of it."""
 
@@ -42,7 +44,7 @@ def main() -> None:
         size, truth = write_fleet(logs, robot, options)
         found: dict[str, object] = {"recordings": options.recordings, "rows_each": options.rows, "log_bytes": size}
         clock: dict[str, float] = {}
-        with timed(clock, "start_workers"), open_workers("local", workers=options.workers) as workers:
+        with timed(clock, "many_fleet_and_start"), open_workers("local", workers=options.workers) as workers:
             with timed(clock, "many"):
                 many = identify_many(robot, logs, settings, scheduler=workers)
             found |= {f"many_{name}": value for name, value in vars(workers.traffic).items()}
@@ -96,7 +98,8 @@ def write_fleet(folder: Path, robot: Robot, options: argparse.Namespace) -> tupl
         torque = regressor.predict(np.array(theta), motion.q, motion.v, motion.a, time=stamps)
         torque += NOISE * torque.std(axis=0) * random.standard_normal(torque.shape)
         columns = {"time": stamps, "machine": np.full(options.rows, float(machine))}
-        columns |= {f"q_{name}": motion.channels[:, j] for j, name in enumerate(robot.channels)}
+        sensed = motion.channels + SENSOR * random.standard_normal(motion.channels.shape)
+        columns |= {f"q_{name}": sensed[:, j] for j, name in enumerate(robot.channels)}
         columns |= {f"tau_{name}": torque[:, j] for j, name in enumerate(robot.dofs)}
         size += write_columns(folder / f"{k:06d}.{options.format}", columns).stat().st_size
     return size, 0.4 * share

@@ -61,7 +61,7 @@ def excerpts(recordings: Sequence[Source], mapped: Mapped = map) -> tuple[Source
     if not is_long(recordings):
         return tuple(recordings)
     rows = min(SHORTEST_EXCERPT, max(map(len, recordings)))
-    most = EXCERPT_ROWS * EXCERPTS // rows
+    most = max(EXCERPT_ROWS * EXCERPTS // rows, 1)
     if len(recordings) > most:
         recordings = [recordings[k] for k in np.linspace(0, len(recordings) - 1, most).round().astype(int).tolist()]
     share = EXCERPT_ROWS * EXCERPTS // len(recordings)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import builtins
 import contextlib
 import csv
+import dataclasses
 import json
+import pickle
 import sys
 from pathlib import Path
 
@@ -17,11 +19,15 @@ from casysid.dynamics import build_regressor
 from casysid.errors import MissingExtraError, ParameterError, RecordingError
 from casysid.identification import Settings, identify, passes
 from casysid.identification.many import identify_fleet, identify_many, open_workers
+from casysid.identification.many.compact import flattened
 from casysid.identification.many.differences import difference, drift
 from casysid.identification.many.logs import find_logs
+from casysid.identification.tuning.band import motion_band
 from casysid.readers.constants import constant_of
 from casysid.readers.writing import write_columns
 from casysid.recording import open_recordings
+from casysid.signals import cutoff_of, noise_of, spectrum_of
+from casysid.signals.noise import band_of, speed_of
 from casysid.simulation import design_sinusoids
 from tests.simulated import bundled_robot
 
@@ -46,7 +52,9 @@ def write_log(path: Path, seed: int, *, viscous: float = 1.0, machine: float = 0
     tau = regressor.predict(truth, motion.q, motion.v, motion.a, time=time)
     tau += 0.02 * np.std(tau, axis=0) * random.standard_normal(tau.shape)
     columns = {"time": time, "machine": np.full(rows, machine)}
-    columns |= {f"q_{name}": motion.q[:, k] for k, name in enumerate(robot.channels)}
+    columns |= {
+        f"q_{name}": motion.q[:, k] + 1e-4 * random.standard_normal(rows) for k, name in enumerate(robot.channels)
+    }
     columns |= {f"tau_{name}": tau[:, k] for k, name in enumerate(robot.dofs)}
     return write_columns(path, columns)
 
@@ -84,6 +92,28 @@ def test_the_answer_is_that_of_one_machine(logs, long, request):
         assert one.relative == pytest.approx(other.relative, rel=1e-10)
         assert one.relative_unfiltered == pytest.approx(other.relative_unfiltered, rel=1e-10)
         np.testing.assert_allclose(one.rmse, other.rmse, rtol=1e-10)
+
+
+@pytest.mark.parametrize("level", [0.0, 1e-5, 1e-2])
+@pytest.mark.parametrize("rows", [999, 1000, 1002, 70_000])
+def test_a_flattened_spectrum_says_the_same(level, rows):
+    random, time = np.random.default_rng(rows), np.arange(rows) / RATE
+    waves = np.column_stack([np.sin(2.0 * time), np.sin(9.0 * time) + 0.1 * np.sin(200.0 * time), 0.0 * time])
+    whole = spectrum_of(time, waves + level * random.standard_normal(waves.shape))
+    flat = flattened(whole)
+    for scale in (1.0, 0.3):
+        one, other = (
+            dataclasses.replace(spectrum, segments=max(scale * spectrum.segments, 1.0)) for spectrum in (whole, flat)
+        )
+        assert motion_band(other) == motion_band(one)
+        assert cutoff_of(other, 30.0) == cutoff_of(one, 30.0)
+        np.testing.assert_array_equal(noise_of(other), noise_of(one))
+        np.testing.assert_array_equal(speed_of(other), speed_of(one))
+        np.testing.assert_array_equal(band_of(other), band_of(one))
+    there = pickle.loads(pickle.dumps(flat))
+    np.testing.assert_array_equal(there.frequency, whole.frequency)
+    np.testing.assert_array_equal(there.power, flat.power)
+    assert level == 0.0 or len(pickle.dumps(flat)) < 0.9 * len(pickle.dumps(whole))
 
 
 def test_errors_summed_by_recording_are_those_of_all_samples(logs, small_excerpts):

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from casysid.errors import CasysidWarning, RecordingError
+from casysid.identification.many.compact import compact
 from casysid.identification.many.workers import Workers
 from casysid.recording import RecordingFile
 from casysid.robot import Robot
@@ -103,7 +104,7 @@ def _opened(robot: Robot, by: str | None, split: float | None, path: Path) -> Op
 
     recording, weaknesses = scan_recording(path, robot)
     fitted, held_out = (recording, None) if split is None else recording.split(split)
-    return Opened(fitted, held_out, _machine_of(path, by), weaknesses)
+    return Opened(compact(fitted), None if held_out is None else compact(held_out), _machine_of(path, by), weaknesses)
 
 
 def _machine_of(path: Path, by: str | None) -> str:

@@ -1,7 +1,7 @@
 """Processes and machines that do one thing to each of many recordings: Dask, measured in bytes.
 
 What the work has to know (robot, regressor, choices) goes to every worker once; what it is done to goes as a path and
-some figures, and what comes back is a sum. Everything crosses as pickled bytes, so what is counted is what is moved.
+some figures, and what comes back is a sum. Everything crosses as compressed bytes, so what is counted is what is moved.
 
 Source: https://distributed.dask.org, ``Client.scatter`` and ``Client.submit``.
 """
@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -61,12 +62,12 @@ class Workers:
             CasysidError: As the work raises it.
             ParameterError: The workers do not have the same packages.
         """
-        known, parcels = pickle.dumps(work), [pickle.dumps(item) for item in items]
+        known, parcels = _packed(work), [_packed(item) for item in items]
         results = self._near(known, parcels) if self.client is None else self._far(known, parcels)
         self.traffic.tasks += len(parcels)
         self.traffic.sent += self.count * len(known) + sum(map(len, parcels))
         self.traffic.received += sum(map(len, results))
-        return [pickle.loads(result) for result in results]
+        return [_unpack(result) for result in results]
 
     def _near(self, known: bytes, parcels: list[bytes]) -> list[bytes]:
         import dask
@@ -138,9 +139,17 @@ def _done(known: bytes, parcel: bytes) -> bytes:
     key = hashlib.sha256(known).digest()
     if key not in _unpacked:
         _unpacked.clear()
-        _unpacked[key] = pickle.loads(known)
+        _unpacked[key] = _unpack(known)
     with single_threaded():
-        return pickle.dumps(_unpacked[key](pickle.loads(parcel)))
+        return _packed(_unpacked[key](_unpack(parcel)))
+
+
+def _packed(value: Any) -> bytes:
+    return zlib.compress(pickle.dumps(value), level=1)
+
+
+def _unpack(parcel: bytes) -> Any:
+    return pickle.loads(zlib.decompress(parcel))
 
 
 def _processors() -> int:
