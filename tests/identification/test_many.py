@@ -258,6 +258,11 @@ def test_the_command_writes_the_fleet(logs, tmp_path, monkeypatch, small_excerpt
     assert (out / "result.json").exists()
 
 
+def test_a_bad_log_is_one_message(logs):
+    with pytest.raises(RecordingError, match="no column 'arm' to tell machines apart by"):
+        identify_fleet(bundled_robot(ROBOT), logs, "arm", SETTINGS, scheduler="synchronous")
+
+
 @pytest.mark.slow
 def test_two_processes_give_the_same(logs, small_excerpts):
     robot = bundled_robot(ROBOT)

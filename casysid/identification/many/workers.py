@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from casysid.errors import MissingExtraError, ParameterError
+from casysid.errors import CasysidError, MissingExtraError, ParameterError
 from casysid.threads import single_threaded
 
 LOCAL, HERE = "local", "synchronous"
@@ -67,7 +67,7 @@ class Workers:
         self.traffic.tasks += len(parcels)
         self.traffic.sent += self.count * len(known) + sum(map(len, parcels))
         self.traffic.received += sum(map(len, results))
-        return [_unpack(result) for result in results]
+        return [_value(_unpack(result)) for result in results]
 
     def _near(self, known: bytes, parcels: list[bytes]) -> list[bytes]:
         import dask
@@ -110,7 +110,7 @@ def open_workers(scheduler: str | None = None, workers: int | None = None) -> It
         yield Workers(None, 1)
     elif scheduler in (None, LOCAL):
         with (
-            LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=None) as cluster,
+            LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=":0") as cluster,
             Client(cluster) as client,
         ):
             yield Workers(client, count)
@@ -140,8 +140,24 @@ def _done(known: bytes, parcel: bytes) -> bytes:
     if key not in _unpacked:
         _unpacked.clear()
         _unpacked[key] = _unpack(known)
-    with single_threaded():
-        return _packed(_unpacked[key](_unpack(parcel)))
+    try:
+        with single_threaded():
+            return _packed(_unpacked[key](_unpack(parcel)))
+    except CasysidError as error:  # as a value: Dask would print a traceback of it
+        return _packed(_Refused(error))
+
+
+@dataclass(frozen=True)
+class _Refused:
+    """Bad input, found by a worker."""
+
+    error: CasysidError
+
+
+def _value(result: Any) -> Any:
+    if isinstance(result, _Refused):
+        raise result.error
+    return result
 
 
 def _packed(value: Any) -> bytes:
