@@ -176,7 +176,7 @@ class Passes:
         self.passes += 1
         parts = self._long_moments(regressor) if is_long(self.recordings) else self._short_moments(regressor)
         self.blocks = tuple(part.blocks for part in parts)
-        return _added(parts).with_rows_only()
+        return added(parts).with_rows_only()
 
     def _long_moments(self, regressor: Regressor) -> list[Moments]:
         self.smoothings += 1
@@ -280,7 +280,7 @@ class Passes:
             share = (motion.time[0] - recording.start) / max(recording.duration, np.finfo(np.float64).tiny)
             place = min(int(blocks * share), blocks - 1)
             groups[place] = (groups[place] + found).merged_blocks([[0, 1]]) if place in groups else found
-        return _added([groups[place] for place in sorted(groups)])
+        return added([groups[place] for place in sorted(groups)])
 
     def _near_rest(self, motion: Motion) -> Mask:
         return np.asarray(motion.standing | (np.abs(motion.v) < NEAR_REST * self.width))
@@ -339,15 +339,15 @@ def sum_moments(
         )
         for motion, mask in zip(motions, near_rest or repeat(None), strict=False)
     ]
-    total = _added(parts)
+    total = added(parts)
     return total.with_rows_only() if only_rows else total
 
 
-def _added(parts: Sequence[Moments]) -> Moments:
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part
-    return total
+def added(parts: Sequence[Moments]) -> Moments:
+    """The blocks of all, one after the other; in pairs, so that of many parts none is copied often."""
+    while len(parts) > 1:
+        parts = [sum(parts[k + 1 : k + 2], parts[k]) for k in range(0, len(parts), 2)]
+    return parts[0]
 
 
 def _sparse(motion: Motion, stride: int) -> Motion:

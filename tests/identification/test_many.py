@@ -7,6 +7,8 @@ import contextlib
 import csv
 import dataclasses
 import json
+import logging
+import os
 import pickle
 import sys
 from pathlib import Path
@@ -16,7 +18,7 @@ import pytest
 
 from casysid.cli import main
 from casysid.dynamics import build_regressor
-from casysid.errors import MissingExtraError, ParameterError, RecordingError
+from casysid.errors import CasysidWarning, MissingExtraError, ParameterError, RecordingError
 from casysid.identification import Settings, identify, passes
 from casysid.identification.many import identify_fleet, identify_many, open_workers
 from casysid.identification.many.compact import flattened
@@ -225,7 +227,7 @@ def test_a_machine_may_be_a_word_or_a_number(tmp_path):
         constant_of(tmp_path / "a.csv", "robot")
 
 
-def test_without_dask_a_message_says_what_to_install(monkeypatch):
+def test_without_dask_one_process_works_and_a_message_says_what_to_install(monkeypatch):
     true_import = builtins.__import__
 
     def without(name, *rest):
@@ -234,11 +236,17 @@ def test_without_dask_a_message_says_what_to_install(monkeypatch):
         return true_import(name, *rest)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(MissingExtraError, match=r"pip install 'casysid\[cluster\]'"), open_workers():
+    with pytest.warns(CasysidWarning, match=r"pip install 'casysid\[cluster\]'"), open_workers(workers=2) as workers:
+        assert workers(abs, [-1, 2]) == [1, 2]
+    with (
+        pytest.raises(MissingExtraError, match=r"pip install 'casysid\[cluster\]'"),
+        open_workers("local", workers=2),
+    ):
         pass
 
 
 def test_a_wrong_address_is_one_message():
+    pytest.importorskip("distributed")
     with pytest.raises(ParameterError, match="none answers"), open_workers("nonsense"):
         pass
 
@@ -263,10 +271,42 @@ def test_a_bad_log_is_one_message(logs):
         identify_fleet(bundled_robot(ROBOT), logs, "arm", SETTINGS, scheduler="synchronous")
 
 
+@pytest.fixture(scope="module")
+def cluster():
+    """Two processes that a scheduler hands work to."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=2, dashboard_address=":0", silence_logs=logging.CRITICAL
+    ) as running:
+        yield running
+
+
 @pytest.mark.slow
-def test_two_processes_give_the_same(logs, small_excerpts):
+def test_processes_at_an_address_give_the_same(cluster, logs, small_excerpts):
     robot = bundled_robot(ROBOT)
     here = identify_many(robot, logs, SETTINGS, scheduler="synchronous")
-    with open_workers("local", workers=2) as workers:
-        there = identify_many(robot, logs, SETTINGS, scheduler=workers)
+    there = identify_many(robot, logs, SETTINGS, scheduler=cluster.scheduler_address)
     np.testing.assert_allclose(there.parameters, here.parameters, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_what_goes_wrong_at_workers_is_one_message(cluster, logs, monkeypatch):
+    address = cluster.scheduler_address
+    with pytest.raises(RecordingError, match="no column 'arm' to tell machines apart by"):
+        identify_fleet(bundled_robot(ROBOT), logs, "arm", SETTINGS, scheduler=address)
+    with monkeypatch.context() as other:
+        other.setattr("casysid.__version__", "0.0.9")
+        with (
+            pytest.raises(ParameterError, match=r"wanted casysid 0\.0\.9 on every worker; got "),
+            open_workers(address),
+        ):
+            pass
+    with pytest.raises(ParameterError, match="workers were lost"), open_workers(address) as workers:
+        workers(os._exit, [1, 1])
+
+
+@pytest.mark.slow
+def test_processes_of_this_machine_are_started_for_the_work():
+    pytest.importorskip("distributed")
+    with open_workers("local", workers=2) as workers:
+        assert workers(abs, [-1, 2, -3]) == [1, 2, 3]

@@ -17,6 +17,7 @@ from casysid.identification.many.differences import Difference, Drift, differenc
 from casysid.identification.many.logs import BY_RECORDING, Logs
 from casysid.identification.many.pipeline import prepare_many
 from casysid.identification.many.workers import Workers, open_workers
+from casysid.identification.passes import added
 from casysid.identification.pipeline import Progress, fit, silent, solve
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
@@ -120,7 +121,7 @@ def identify_fleet(
         progress: Likewise.
 
     Raises:
-        MissingExtraError: Dask is not installed.
+        MissingExtraError: A scheduler is given and Dask is not installed.
         RecordingError: There is no log, or one cannot be used, or does not tell its machine.
         SolverError: No consistent parameters of all together could be found.
     """
@@ -136,11 +137,11 @@ def identify_fleet(
             names = [str(one.fitted.sources[0]) for one in many.opened]
         groups = {name: tuple(k for k, other in enumerate(names) if other == name) for name in dict.fromkeys(names)}
         ask = partial(_answer, regressor, settings)
-        answers = list(workers(ask, [_together([parts[k] for k in group]) for group in groups.values()]))
+        answers = list(workers(ask, [added([parts[k] for k in group]).with_rows_only() for group in groups.values()]))
         progress("machines", 0.5)
         in_time = [k for group in groups.values() if len(group) >= FEWEST_IN_TIME for k in group]
         plain = partial(_answer, regressor, dataclasses.replace(settings, consistency=None))
-        single = dict(zip(in_time, workers(plain, [_together([parts[k]]) for k in in_time]), strict=True))
+        single = dict(zip(in_time, workers(plain, [parts[k].with_rows_only() for k in in_time]), strict=True))
         progress("machines", 1.0)
     quantities, _ = quantities_of(regressor)
     units = tuple("kg" if name.startswith("mass") else COMPARED[name.split(" of ")[0]] for name in quantities)
@@ -176,13 +177,6 @@ def _parts(moments: Moments, blocks: Sequence[int]) -> list[Moments]:
     """Of each recording."""
     ends = np.cumsum(blocks)
     return [moments.select_blocks(np.arange(end - count, end)) for count, end in zip(blocks, ends, strict=True)]
-
-
-def _together(parts: Sequence[Moments]) -> Moments:
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part
-    return total.with_rows_only()
 
 
 def _answer(regressor: Regressor, settings: Settings, moments: Moments) -> Answer:

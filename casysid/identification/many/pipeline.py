@@ -58,7 +58,7 @@ def identify_many(
         progress: Called with the stage and the share done.
 
     Raises:
-        MissingExtraError: Dask is not installed.
+        MissingExtraError: A scheduler is given and Dask is not installed.
         RecordingError: There is no log, or one cannot be used.
         SolverError: No consistent parameters could be found.
     """

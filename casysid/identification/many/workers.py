@@ -8,20 +8,23 @@ Source: https://distributed.dask.org, ``Client.scatter`` and ``Client.submit``.
 
 from __future__ import annotations
 
-import hashlib
+import logging
 import os
 import pickle
+import warnings
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
-from casysid.errors import CasysidError, MissingExtraError, ParameterError
+from casysid.errors import CasysidError, CasysidWarning, MissingExtraError, ParameterError
 from casysid.threads import single_threaded
 
 LOCAL, HERE = "local", "synchronous"
 """Words for schedulers that are no address: processes on this machine, and this process."""
+INSTALL = "pip install 'casysid[cluster]'"
 PATIENCE = 10.0
 """For a scheduler's answer [s]: it takes milliseconds on a network that works."""
 
@@ -60,28 +63,31 @@ class Workers:
 
         Raises:
             CasysidError: As the work raises it.
-            ParameterError: The workers do not have the same packages.
+            ParameterError: Workers were lost.
         """
         known, parcels = _packed(work), [_packed(item) for item in items]
-        results = self._near(known, parcels) if self.client is None else self._far(known, parcels)
+        if self.client is None:
+            results = [_done(known, parcel) for parcel in parcels]
+        else:
+            results = self._far(known, parcels)
         self.traffic.tasks += len(parcels)
         self.traffic.sent += self.count * len(known) + sum(map(len, parcels))
         self.traffic.received += sum(map(len, results))
         return [_value(_unpack(result)) for result in results]
 
-    def _near(self, known: bytes, parcels: list[bytes]) -> list[bytes]:
-        import dask
-
-        tasks = [dask.delayed(_done, pure=False)(known, parcel) for parcel in parcels]
-        return list(dask.compute(*tasks, scheduler="synchronous"))
-
     def _far(self, known: bytes, parcels: list[bytes]) -> list[bytes]:
+        from concurrent.futures import CancelledError
+
+        from distributed import KilledWorker
+        from distributed.comm import CommClosedError
+
         try:
             spread = self.client.scatter(known, broadcast=True)
             return list(self.client.gather([self.client.submit(_done, spread, one, pure=False) for one in parcels]))
-        except ModuleNotFoundError as error:
+        except (KilledWorker, CancelledError, CommClosedError, TimeoutError) as error:
             raise ParameterError(
-                f"the scheduler's workers have no package {error.name}; install the same casysid on every worker"
+                f"workers were lost ({type(error).__name__}): killed, most often for want of memory, or no longer "
+                "reached. A cluster's own logs say why; take fewer workers on a machine, or give each more memory"
             ) from error
 
 
@@ -94,57 +100,83 @@ def open_workers(scheduler: str | None = None, workers: int | None = None) -> It
             processes on this machine, ``synchronous`` for this process.
         workers: Local processes; None for as many as there are processors for this process. One is this process.
 
+    Warns:
+        CasysidWarning: Dask is not installed, and nothing was asked for: this process does the work.
+
     Raises:
         MissingExtraError: Dask is not installed.
-        ParameterError: No scheduler answers.
+        ParameterError: No scheduler answers, it has no workers, or they do not have this casysid.
     """
-    try:
-        import dask  # noqa: F401
-        from distributed import Client, LocalCluster
-    except ImportError as error:
-        raise MissingExtraError(
-            "many recordings at once need Dask, which is not installed; run: pip install 'casysid[cluster]'"
-        ) from error
     count = _processors() if workers is None else workers
     if scheduler == HERE or (scheduler in (None, LOCAL) and count == 1):
         yield Workers(None, 1)
-    elif scheduler in (None, LOCAL):
+        return
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        if scheduler is not None:
+            raise MissingExtraError(f"--scheduler needs Dask, which is not installed; run: {INSTALL}") from error
+        said = f"Dask is not installed: one process works through the recordings. For all processors: {INSTALL}"
+        warnings.warn(said, CasysidWarning, stacklevel=3)
+        yield Workers(None, 1)
+        return
+    if scheduler in (None, LOCAL):
         with (
-            LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=":0") as cluster,
+            LocalCluster(
+                n_workers=count, threads_per_worker=1, dashboard_address=":0", silence_logs=logging.CRITICAL
+            ) as cluster,
             Client(cluster) as client,
         ):
             yield Workers(client, count)
-    else:
-        try:
-            client = Client(scheduler, timeout=PATIENCE)
-        except (OSError, ValueError, TypeError) as error:
-            raise ParameterError(
-                f"--scheduler wants local or the address of a running Dask scheduler, such as tcp://10.0.0.1:8786; "
-                f"got {scheduler!r}, where none answers. Start one with: dask scheduler"
-            ) from error
-        with client:
-            there = len(client.scheduler_info(n_workers=-1)["workers"])
-            if not there:
-                raise ParameterError(
-                    f"the scheduler at {scheduler} has no workers; start one on each machine: dask worker {scheduler}"
-                )
-            yield Workers(client, there)
+        return
+    try:
+        client = Client(scheduler, timeout=PATIENCE)
+    except (OSError, ValueError, TypeError) as error:
+        raise ParameterError(
+            f"--scheduler wants local or the address of a running Dask scheduler, such as tcp://10.0.0.1:8786; "
+            f"got {scheduler!r}, where none answers. Start one with: dask scheduler"
+        ) from error
+    with client:
+        yield Workers(client, _alike(client, scheduler))
 
 
-_unpacked: dict[bytes, Callable[[Any], Any]] = {}
+def _alike(client: Any, scheduler: str | None) -> int:
+    """How many workers there are, all with this casysid."""
+    try:
+        versions = client.run(_version)
+    except (ImportError, AttributeError) as error:
+        raise ParameterError(
+            f"the workers of {scheduler} have no casysid ({error}); install casysid {_version()} on every worker"
+        ) from error
+    if not versions:
+        raise ParameterError(
+            f"the scheduler at {scheduler} has no workers; start one on each machine: dask worker {scheduler}"
+        )
+    others = sorted({f"{version} at {worker}" for worker, version in versions.items() if version != _version()})
+    if others:
+        raise ParameterError(f"wanted casysid {_version()} on every worker; got {', '.join(others)[:300]}")
+    return len(versions)
+
+
+def _version() -> str:
+    from casysid import __version__
+
+    return __version__
 
 
 def _done(known: bytes, parcel: bytes) -> bytes:
-    """On a worker: unpack what the work has to know once, and do it."""
-    key = hashlib.sha256(known).digest()
-    if key not in _unpacked:
-        _unpacked.clear()
-        _unpacked[key] = _unpack(known)
+    """On a worker: do what is known to what is in the parcel."""
     try:
         with single_threaded():
-            return _packed(_unpacked[key](_unpack(parcel)))
+            return _packed(_work(known)(_unpack(parcel)))
     except CasysidError as error:  # as a value: Dask would print a traceback of it
         return _packed(_Refused(error))
+
+
+@lru_cache(maxsize=1)
+def _work(known: bytes) -> Callable[[Any], Any]:
+    """What the work has to know, unpacked once for all its parcels."""
+    return _unpack(known)  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)
