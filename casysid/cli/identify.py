@@ -18,12 +18,12 @@ from casysid.cli.options import (
     DelayOption,
     FlipOption,
     FloatingOption,
+    FoldersArgument,
     FrictionOption,
     FrictionWord,
     GravityOption,
     HeldOutOption,
     LockOption,
-    LogsArgument,
     PositionNoiseOption,
     RobotArgument,
     SchedulerOption,
@@ -54,7 +54,7 @@ SMALLEST_RUN = 2**15
 
 def identify(
     robot: RobotArgument,
-    logs: LogsArgument,
+    logs: FoldersArgument,
     held_out: HeldOutOption = None,
     split: SplitOption = None,
     scheduler: SchedulerOption = None,

@@ -34,6 +34,9 @@ class FrictionWord(enum.StrEnum):
 
 RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="URDF or MJCF file, or a bundled model's name.")]
 LogsArgument = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings: CSV, CSV.gz, Parquet or NPZ.")]
+FoldersArgument = Annotated[
+    list[Path], typer.Argument(metavar="LOG...", help="Recordings, or folders of them: CSV, CSV.gz, Parquet or NPZ.")
+]
 SchedulerOption = Annotated[
     str | None,
     typer.Option(

@@ -24,6 +24,7 @@ from casysid.identification.many import identify_fleet, identify_many, open_work
 from casysid.identification.many.compact import flattened
 from casysid.identification.many.differences import difference, drift
 from casysid.identification.many.logs import find_logs
+from casysid.identification.many.quantities import quantities_of
 from casysid.identification.tuning.band import motion_band
 from casysid.readers.constants import constant_of
 from casysid.readers.writing import write_columns
@@ -159,6 +160,28 @@ def test_machines_of_a_fleet_are_told_apart(logs, small_excerpts):
         assert weak.low[k] < 0.4 < weak.high[k] or abs(weak.values[k] - 0.4) < 0.02
         assert fleet.differences[k].chance < 1e-6
         assert fleet.differences[k].between == pytest.approx(0.2 / np.sqrt(2.0), rel=0.2)
+
+
+def test_all_dry_friction_is_one_quantity_and_first_moments_carry_what_no_mass_tells(logs, small_excerpts):
+    robot = bundled_robot(ROBOT)
+    fleet = identify_fleet(robot, logs, "machine", Settings(delay=0.0, time_scale=1.0), scheduler="synchronous")
+    kinds = {one.kind for one in fleet.pooled.regressor.parameters}
+    assert "sharp_coulomb" in kinds
+    compared = quantities_of(fleet.pooled.regressor, fleet.pooled.structural)
+    pooled = dict(zip(compared.names, compared.weights @ fleet.pooled.parameters, strict=True))
+    for dof, found in fleet.pooled.dry_friction().items():
+        k = fleet.quantities.index(f"dry friction of {dof}")
+        assert pooled[f"dry friction of {dof}"] == pytest.approx(found, rel=1e-12)
+        for machine in fleet.machines:
+            assert machine.answer.values[k] == pytest.approx(0.3, rel=0.1)
+    truth = build_regressor(robot)
+    ends = compared.weights[:, : len(truth.prior)] @ truth.prior
+    for machine in fleet.machines:
+        told = np.isfinite(machine.answer.std)
+        moments = [k for k, name in enumerate(fleet.quantities) if ".mc" in name]
+        assert told[moments].any()
+        for k in moments:
+            assert not told[k] or machine.answer.values[k] == pytest.approx(ends[k], abs=0.02)
 
 
 @pytest.mark.parametrize("long", [True, False])

@@ -16,6 +16,7 @@ from casysid.errors import SolverError
 from casysid.identification.many.differences import Difference, Drift, difference, drift
 from casysid.identification.many.logs import BY_RECORDING, Logs
 from casysid.identification.many.pipeline import prepare_many
+from casysid.identification.many.quantities import Quantities, quantities_of
 from casysid.identification.many.workers import Workers, open_workers
 from casysid.identification.passes import added
 from casysid.identification.pipeline import Progress, fit, silent, solve
@@ -25,8 +26,6 @@ from casysid.moments import Moments
 from casysid.robot import Robot
 from casysid.threads import single_threaded
 
-COMPARED = {"viscous": "N m s/rad, N s/m", "coulomb": "N m, N"}
-"""Kinds of friction that machines are compared by, with their units."""
 FEWEST_IN_TIME = 3
 """Recordings of a machine, of which a slope has a standard error."""
 
@@ -130,47 +129,35 @@ def identify_fleet(
         many = prepare_many(robot, logs, settings, workers, held_out=held_out, split=split, by=by, progress=progress)
         preparation = many.preparation
         regressor, parts = preparation.regressor, _parts(preparation.moments, preparation.passes.blocks)
+        compared = quantities_of(regressor, preparation.structural)
         pooled = solve(preparation, settings, progress=progress)
         progress("machines", 0.0)
         names = [one.machine for one in many.opened]
         if by == BY_RECORDING:
             names = [str(one.fitted.sources[0]) for one in many.opened]
         groups = {name: tuple(k for k, other in enumerate(names) if other == name) for name in dict.fromkeys(names)}
-        ask = partial(_answer, regressor, settings)
+        ask = partial(_answer, regressor, settings, compared)
         answers = list(workers(ask, [added([parts[k] for k in group]).with_rows_only() for group in groups.values()]))
         progress("machines", 0.5)
         in_time = [k for group in groups.values() if len(group) >= FEWEST_IN_TIME for k in group]
-        plain = partial(_answer, regressor, dataclasses.replace(settings, consistency=None))
+        plain = partial(_answer, regressor, dataclasses.replace(settings, consistency=None), compared)
         single = dict(zip(in_time, workers(plain, [parts[k].with_rows_only() for k in in_time]), strict=True))
         progress("machines", 1.0)
-    quantities, _ = quantities_of(regressor)
-    units = tuple("kg" if name.startswith("mass") else COMPARED[name.split(" of ")[0]] for name in quantities)
     machines = tuple(
-        Machine(name, group, answer, _drifts([single[k] for k in group if k in single], len(quantities)))
+        Machine(name, group, answer, _drifts([single[k] for k in group if k in single], len(compared.names)))
         for (name, group), answer in zip(groups.items(), answers, strict=True)
     )
     values, std = np.array([one.values for one in answers]), np.array([one.std for one in answers])
     return Fleet(
         by=by,
-        quantities=quantities,
-        units=units,
+        quantities=compared.names,
+        units=compared.units,
         pooled=pooled,
         machines=machines,
-        differences=tuple(difference(values[:, k], std[:, k]) for k in range(len(quantities))),
-        drifts=_drifts(answers if by == BY_RECORDING else [], len(quantities)),
+        differences=tuple(difference(values[:, k], std[:, k]) for k in range(len(compared.names))),
+        drifts=_drifts(answers if by == BY_RECORDING else [], len(compared.names)),
         files=tuple(one.fitted.label for one in many.opened),
     )
-
-
-def quantities_of(regressor: Regressor) -> tuple[tuple[str, ...], Array]:
-    """Names of what machines are compared by, and the parameters' weights in each, shape (k, p)."""
-    names, rows = ["mass of all links"], [np.array([float(one.kind == "m") for one in regressor.parameters])]
-    for kind in ("m", *COMPARED):
-        for place, parameter in enumerate(regressor.parameters):
-            if parameter.kind == kind:
-                names.append(f"{'mass' if kind == 'm' else kind} of {parameter.owner}")
-                rows.append(np.eye(len(regressor.parameters))[place])
-    return tuple(names), np.array(rows)
 
 
 def _parts(moments: Moments, blocks: Sequence[int]) -> list[Moments]:
@@ -179,9 +166,9 @@ def _parts(moments: Moments, blocks: Sequence[int]) -> list[Moments]:
     return [moments.select_blocks(np.arange(end - count, end)) for count, end in zip(blocks, ends, strict=True)]
 
 
-def _answer(regressor: Regressor, settings: Settings, moments: Moments) -> Answer:
+def _answer(regressor: Regressor, settings: Settings, compared: Quantities, moments: Moments) -> Answer:
     """The model of some recordings, from their moments alone."""
-    _, weights = quantities_of(regressor)
+    weights = compared.weights
     try:
         estimate, projection, sure = fit(regressor, moments, settings)
     except SolverError as error:
@@ -194,7 +181,7 @@ def _answer(regressor: Regressor, settings: Settings, moments: Moments) -> Answe
     half = sure.quantile() * std
     low = values - half
     if settings.consistency is not None:
-        low = np.maximum(low, 0.0)
+        low = np.where(compared.non_negative, np.maximum(low, 0.0), low)
     return Answer(
         estimate.status.value,
         float(missed),

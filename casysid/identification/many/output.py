@@ -58,16 +58,28 @@ def fleet_to_json(fleet: Fleet) -> dict[str, object]:
 
 
 def fleet_rows(fleet: Fleet) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
-    """Header and rows of a table of how the machines differ."""
-    header = ("quantity", "unit", "machines", "mean", "between machines", "chance if equal", "drift a recording")
+    """Header and rows of a table of how the machines differ: the standard deviation between them, the chance that
+    equal machines scatter so much (a star where it is small), and change with the order of recordings.
+    """
+    header = ("quantity", "told by", "mean", "± between", "chance", "drift")
     rows = []
-    for name, unit, found, moved in zip(fleet.quantities, fleet.units, fleet.differences, fleet.drifts, strict=True):
+    for k, (name, unit, found) in enumerate(zip(fleet.quantities, fleet.units, fleet.differences, strict=True)):
         if found is None:
             continue
-        change = "" if moved is None else f"{moved.slope:.2g} ({moved.low:.2g} to {moved.high:.2g})"
         chance = f"{found.chance:.2g}{' *' if found.chance < SIGNIFICANT else ''}"
-        rows.append((name, unit, str(found.told), f"{found.mean:.4g}", f"{found.between:.2g}", chance, change))
+        figures = f"{found.mean:.4g}", f"{found.between:.2g}", chance, _drift_words(fleet, k)
+        rows.append((f"{name} [{unit}]", str(found.told), *figures))
     return header, tuple(rows)
+
+
+def _drift_words(fleet: Fleet, quantity: int) -> str:
+    """The slope over all recordings, or how many machines' slopes have intervals without zero."""
+    moved = fleet.drifts[quantity]
+    if moved is not None:
+        return f"{moved.slope:.2g} ({moved.low:.2g} to {moved.high:.2g})"
+    known = [drift for drift in (machine.drifts[quantity] for machine in fleet.machines) if drift is not None]
+    drifting = sum(not drift.low <= 0.0 <= drift.high for drift in known)
+    return f"{drifting} of {len(known)}" if known else ""
 
 
 def _by_quantity(fleet: Fleet, found: tuple[object, ...]) -> dict[str, object]:
