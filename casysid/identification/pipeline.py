@@ -29,7 +29,7 @@ from casysid.identification.tuning.delay import choose_delay
 from casysid.identification.tuning.drive_gains import choose_drive_gains
 from casysid.identification.tuning.friction_selection import FrictionChoice, select_friction
 from casysid.moments import Moments
-from casysid.projection import ProjectionProblem, ProjectionResult, build_projection, possible_parameters, project
+from casysid.projection import PossibleParameters, ProjectionProblem, ProjectionResult, build_projection, project
 from casysid.recording import Source
 from casysid.robot import Robot
 from casysid.signals import InputNoise, Motion
@@ -246,7 +246,7 @@ def _estimate(
 ) -> Estimate:
     if problem is None:
         return settings.method.estimate(moments, regressor.prior)
-    return settings.method.estimate_among(moments, regressor.prior, possible_parameters(problem, regressor.prior))
+    return settings.method.estimate_among(moments, regressor.prior, PossibleParameters(problem, regressor.prior))
 
 
 def _project(
