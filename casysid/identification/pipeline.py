@@ -19,6 +19,7 @@ from casysid.identification.choices import Choices
 from casysid.identification.friction_laws import friction_laws
 from casysid.identification.mistakes import find_mistakes
 from casysid.identification.noise_moments import with_noise
+from casysid.identification.order import as_given, places_by_content
 from casysid.identification.passes import Mapped, Passes, excerpts, is_long
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
@@ -62,6 +63,7 @@ class Preparation:
         unseen: Over the recordings that are only predicted; None if there are none.
         input_noise: Of the measured motion; None where no method needs it, or it is not known.
         structural: Base parameters of the mechanism.
+        places: In the order of the moments' blocks, the places of the fitted recordings as they were given.
         seconds: Wall time by stage.
     """
 
@@ -75,6 +77,7 @@ class Preparation:
     unseen: Passes | None
     input_noise: InputNoise | None
     structural: BaseParameters
+    places: tuple[int, ...]
     seconds: dict[str, float]
 
 
@@ -138,6 +141,8 @@ def prepare(
     check_noise(fitted, settings.input_noise)
     clock = _Clock()
     fitted, held_out = (tuple(one.flipped(settings.flip) for one in several) for several in (fitted, held_out))
+    places = places_by_content(fitted)
+    fitted = tuple(fitted[place] for place in places)
     progress("tuning", 0.0)
     chosen = _choose(robot, fitted, settings, progress, mapped)
     clock.lap("tuning")
@@ -157,12 +162,13 @@ def prepare(
         choices=chosen.choices,
         regressor=regressor,
         moments=moments,
-        motions=chosen.looked_at.motions,
+        motions=as_given(chosen.looked_at.motions, places),
         held_out=_shown(unseen, mapped),
         passes=passes,
         unseen=unseen if held_out else None,
         input_noise=noise,
         structural=structural,
+        places=places,
         seconds=clock.laps,
     )
 
@@ -194,7 +200,7 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
     passes, unseen = preparation.passes, preparation.unseen
     vectors = [parameters, estimate.parameters, prior]
     fitted = [parameters] if unseen else vectors
-    errors = passes.errors(regressor, fitted, band)
+    errors = tuple(one.as_given(preparation.places) for one in passes.errors(regressor, fitted, band))
     judged = unseen.errors(regressor, vectors, band) if unseen else errors
     result = IdentificationResult(
         robot=preparation.robot,

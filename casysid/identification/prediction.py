@@ -7,7 +7,7 @@ alone, away from the ends of stretches of time; and compared once more as they a
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
+from casysid.identification.order import as_given
 from casysid.signals import BandAverage, Motion
 from casysid.threads import single_threaded
 
@@ -42,6 +43,13 @@ class TorqueError:
     times: tuple[Array, ...]
     measured: tuple[Array, ...]
     predictions: tuple[Array, ...]
+
+    def as_given(self, places: Sequence[int]) -> TorqueError:
+        """With the curves of sorted recordings, one of each, in the order in which the recordings were given."""
+        times, measured, predictions = (
+            as_given(curves, places) for curves in (self.times, self.measured, self.predictions)
+        )
+        return replace(self, times=times, measured=measured, predictions=predictions)
 
 
 @single_threaded()

@@ -18,6 +18,7 @@ from casysid.identification.many.logs import BY_RECORDING, Logs
 from casysid.identification.many.pipeline import prepare_many
 from casysid.identification.many.quantities import Quantities, quantities_of
 from casysid.identification.many.workers import Workers, open_workers
+from casysid.identification.order import as_given
 from casysid.identification.passes import added
 from casysid.identification.pipeline import Progress, fit, silent, solve
 from casysid.identification.result import IdentificationResult
@@ -128,7 +129,10 @@ def identify_fleet(
     with nullcontext(scheduler) if isinstance(scheduler, Workers) else open_workers(scheduler) as workers:
         many = prepare_many(robot, logs, settings, workers, held_out=held_out, split=split, by=by, progress=progress)
         preparation = many.preparation
-        regressor, parts = preparation.regressor, _parts(preparation.moments, preparation.passes.blocks)
+        regressor, parts = (
+            preparation.regressor,
+            as_given(_parts(preparation.moments, preparation.passes.blocks), preparation.places),
+        )
         compared = quantities_of(regressor, preparation.structural)
         pooled = solve(preparation, settings, progress=progress)
         progress("machines", 0.0)
