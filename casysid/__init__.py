@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from casysid.identification import compare as compare
     from casysid.identification import identify as identify
     from casysid.identification import prepare as prepare
+    from casysid.identification.many import identify_fleet as identify_fleet
+    from casysid.identification.many import identify_many as identify_many
     from casysid.identification.output import write_result as write_result
     from casysid.inertia import Consistency as Consistency
     from casysid.moments import Moments as Moments
@@ -66,6 +68,8 @@ _HOMES = {
     "find_model": "casysid.bundled",
     "generate_c": "casysid.dynamics",
     "identify": "casysid.identification",
+    "identify_fleet": "casysid.identification.many",
+    "identify_many": "casysid.identification.many",
     "open_recording": "casysid.recording",
     "open_recordings": "casysid.recording",
     "prepare": "casysid.identification",

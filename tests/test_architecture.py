@@ -98,6 +98,8 @@ def test_choices_know_nothing_of_the_pipeline_that_asks_for_them():
         ("clarabel", {"projection"}),
         ("sklearn", {"estimation"}),
         ("pyarrow", {"readers"}),
+        ("dask", {"identification"}),
+        ("distributed", {"identification"}),
     ],
 )
 def test_heavy_packages_stay_in_their_rooms(package, rooms):
