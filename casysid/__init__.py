@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from casysid.identification import prepare as prepare
     from casysid.identification.output import write_result as write_result
     from casysid.inertia import Consistency as Consistency
+    from casysid.kinematics import Kinematics as Kinematics
     from casysid.moments import Moments as Moments
     from casysid.recording import Recording as Recording
     from casysid.recording import open_recording as open_recording
@@ -50,6 +51,7 @@ _HOMES = {
     "Coupling": "casysid.dynamics",
     "ErrorsInVariables": "casysid.estimation",
     "IdentificationResult": "casysid.identification",
+    "Kinematics": "casysid.kinematics",
     "Moments": "casysid.moments",
     "OrdinaryLeastSquares": "casysid.estimation",
     "Plant": "casysid.simulation",

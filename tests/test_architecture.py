@@ -17,7 +17,7 @@ ORDER = (
     ("nlp", "inertia"),
     ("robot", "bundled"),
     ("recording", "readers", "dynamics"),
-    ("signals", "moments", "moments_file", "accumulation"),
+    ("signals", "moments", "moments_file", "accumulation", "kinematics"),
     ("identifiability",),
     ("estimation", "projection", "excitation"),
     ("uncertainty",),

@@ -52,6 +52,7 @@ RANGES: Mapping[str, Range] = {
     "--wall": Range(-1e4, 1e4, " m", "ten kilometres"),
     "--keep-in": Range(-1e4, 1e4, " m", "ten kilometres"),
     "--start": Range(-1e4, 1e4, " rad or m", "a thousand turns, ten kilometres"),
+    "POSITION": Range(-1e4, 1e4, " rad or m", "a thousand turns, ten kilometres"),
     "--rate": Range(1.0, 1e5, " Hz", "a hundred times what robots' controllers usually do"),
     "--rate of rehearse": Range(50.0, 1e4, " Hz", "feedback of 6 Hz needs eight samples a cycle; MuJoCo's steps"),
     "--duration": Range(4.0, 3600.0, " s", "a period of usual motion, an hour"),
