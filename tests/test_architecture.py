@@ -20,6 +20,7 @@ ORDER = (
     ("signals", "moments", "moments_file", "accumulation", "kinematics"),
     ("identifiability",),
     ("estimation", "projection", "excitation"),
+    ("reaching",),
     ("uncertainty",),
     ("identification",),
     ("simulation",),

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from casysid.arrays import Array
 from casysid.kinematics import Dexterity, Kinematics, Pose, dexterity_at
 from casysid.kinematics.frames import WORLD
+from casysid.reaching import Reach, Target
 from casysid.report.tables import MICROMETRES, Table, number
 
 _SHORT = 4  # decimals in a wide table
@@ -50,6 +53,33 @@ def mass_tables(kinematics: Kinematics, q: Array) -> list[tuple[str, Table]]:
         return []
     row = (number(float(masses.sum())), *_fixed(kinematics.centers_of_mass(q)))
     return [("Centre of mass of the moving links", Table(("mass [kg]", "x [m]", "y [m]", "z [m]"), (row,)))]
+
+
+def reach_tables(kinematics: Kinematics, targets: Sequence[Target], answer: Reach) -> list[tuple[str, Table]]:
+    """The posture that was found, and how near the frames are to their targets."""
+    robot = kinematics.robot
+    positions = tuple(
+        (name, f"{value:.9f}", number(float(low)), number(float(high)))
+        for name, value, low, high in zip(
+            robot.channels, answer.position + 0.0, robot.position_lower, robot.position_upper, strict=True
+        )
+    )
+    left = tuple(
+        (target.words, f"{1e3 * distance:.3g}", f"{np.rad2deg(angle):.3g}")
+        for target, distance, angle in zip(targets, answer.distance, answer.angle, strict=True)
+    )
+    return [
+        ("Joint positions [rad, m]", Table(("channel", "position", "lower limit", "upper limit"), positions)),
+        ("What is left", Table(("target", "distance [mm]", "angle [deg]"), left)),
+    ]
+
+
+def reach_words(answer: Reach) -> tuple[str, ...]:
+    """How it ended, in sentences."""
+    lines = [f"{answer.status.value} (starts: {answer.starts}, steps: {answer.steps}, {number(answer.seconds, 2)} s)"]
+    if np.isfinite(answer.clearance):
+        lines.append(f"least distance: {number(1e3 * answer.clearance)} mm, {answer.nearest}")
+    return tuple(lines)
 
 
 def _dexterity(dexterity: Dexterity) -> Table:
