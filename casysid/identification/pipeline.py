@@ -30,9 +30,17 @@ from casysid.identification.tuning.delay import choose_delay
 from casysid.identification.tuning.drive_gains import choose_drive_gains
 from casysid.identification.tuning.friction_selection import FrictionChoice, select_friction
 from casysid.moments import Moments
-from casysid.projection import ProjectionProblem, ProjectionResult, build_projection, possible_parameters, project
+from casysid.projection import (
+    KeptLink,
+    ProjectionProblem,
+    ProjectionResult,
+    build_projection,
+    possible_parameters,
+    project,
+)
 from casysid.recording import Source
 from casysid.robot import Robot
+from casysid.robot.likely_bodies import believed
 from casysid.signals import InputNoise, Motion
 from casysid.signals.admission import FEWEST, FEWEST_TO_PREDICT, check_noise, check_recordings
 from casysid.threads import single_threaded
@@ -53,9 +61,9 @@ class Preparation:
     """All that is read from the data: what every estimator starts from.
 
     Attributes:
-        robot: The robot.
+        robot: The robot as its file has it.
         choices: What was chosen on the way.
-        regressor: With the friction that was chosen.
+        regressor: With the friction that was chosen; its prior is the file's without what no body can be.
         moments: Of the fitted recordings, with what noise added if some method needs it.
         motions: Of the fitted recordings, or of excerpts of long ones.
         held_out: Motions that are only predicted, alike.
@@ -138,7 +146,10 @@ def prepare(
     clock = _Clock()
     fitted, held_out = (tuple(one.flipped(settings.flip) for one in several) for several in (fitted, held_out))
     progress("tuning", 0.0)
-    chosen = _choose(robot, fitted, settings, progress)
+    witness = believed(robot, [known.link for known in settings.knowledge if isinstance(known, KeptLink)])
+    if witness.sentence:
+        warnings.warn(witness.sentence, CasysidWarning, stacklevel=3)
+    chosen = _choose(witness.robot, fitted, settings, progress)
     clock.lap("tuning")
     progress("moments", 0.0)
     regressor, moments, passes = chosen.regressor, chosen.moments, chosen.passes
@@ -146,7 +157,7 @@ def prepare(
     if noise_too or settings.method.needs_input_noise:
         moments, noise = with_noise(moments, regressor, passes, settings.input_noise)
     scale, delay, band = chosen.choices.clock.scale, chosen.choices.delay, chosen.choices.band
-    unseen = Passes(robot, [one.with_time_scaled(scale) for one in held_out], band, delays=delay.seconds)
+    unseen = Passes(witness.robot, [one.with_time_scaled(scale) for one in held_out], band, delays=delay.seconds)
     structural = structural_base_parameters(regressor)
     clock.lap("moments")
     progress("moments", 1.0)
@@ -193,7 +204,8 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
     parameters = estimate.parameters if projection is None else projection.parameters
     band = preparation.choices.band.errors
     passes, unseen = preparation.passes, preparation.unseen
-    vectors = [parameters, estimate.parameters, prior]
+    own = preparation.robot.inertial_parameters
+    vectors = [parameters, estimate.parameters, np.concatenate([own, prior[own.size :]])]
     fitted = [parameters] if unseen else vectors
     errors = torque_errors(regressor, fitted, passes.all_motions(), band)
     judged = torque_errors(regressor, vectors, unseen.all_motions(), band) if unseen else errors
