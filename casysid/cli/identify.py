@@ -8,6 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from casysid.cli.log_options import (
+    ConstantOption,
+    EfficiencyOption,
+    GearOption,
+    MapOption,
+    UnitsOption,
+    declared_of,
+)
 from casysid.cli.options import (
     AccelerationNoiseOption,
     ConsistencyChoice,
@@ -61,6 +69,11 @@ def identify(
     noise_velocity: VelocityNoiseOption = None,
     noise_acceleration: AccelerationNoiseOption = None,
     friction: FrictionOption = FrictionWord.AUTO,
+    units: UnitsOption = None,
+    columns: MapOption = None,
+    motor_constant: ConstantOption = None,
+    gear: GearOption = None,
+    efficiency: EfficiencyOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
     floating_base: FloatingOption = False,
@@ -84,8 +97,9 @@ def identify(
         check_run_folder(out, FILES, SMALLEST_RUN)
         noise = noise_levels(noise_position, noise_velocity, noise_acceleration)
         settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise, friction, flip)
+        said = declared_of(units, columns, motor_constant, gear, efficiency)
         model = load_robot(robot, gravity, lock, floating_base)
-        fitted, unseen = load_recordings(model, logs, held_out, split)
+        fitted, unseen = load_recordings(model, logs, held_out, split, said)
         with progress_bar(console) as progress:
             result = run(model, fitted, settings, held_out=unseen, progress=progress)
             progress("write", 0.0)
