@@ -27,7 +27,10 @@ if TYPE_CHECKING:
     from casysid.identification import identify as identify
     from casysid.identification import prepare as prepare
     from casysid.identification.output import write_result as write_result
+    from casysid.identification.saved import SavedResult as SavedResult
+    from casysid.identification.saved import read_result as read_result
     from casysid.inertia import Consistency as Consistency
+    from casysid.model import RobotModel as RobotModel
     from casysid.moments import Moments as Moments
     from casysid.recording import Recording as Recording
     from casysid.recording import open_recording as open_recording
@@ -56,6 +59,8 @@ _HOMES = {
     "Recording": "casysid.recording",
     "Ridge": "casysid.estimation",
     "Robot": "casysid.robot",
+    "RobotModel": "casysid.model",
+    "SavedResult": "casysid.identification.saved",
     "Settings": "casysid.identification",
     "WeightedLeastSquares": "casysid.estimation",
     "build_dynamics": "casysid.dynamics",
@@ -71,6 +76,7 @@ _HOMES = {
     "prepare": "casysid.identification",
     "read_recording": "casysid.recording",
     "read_recordings": "casysid.recording",
+    "read_result": "casysid.identification.saved",
     "rehearse": "casysid.validation",
     "simulate": "casysid.simulation",
     "write_excitation": "casysid.excitation",

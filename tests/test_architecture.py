@@ -12,7 +12,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "casysid"
 ORDER = (
-    ("errors", "arrays", "archives", "memory", "threads"),
+    ("errors", "arrays", "archives", "json_reading", "memory", "threads"),
     ("outputs",),
     ("nlp", "inertia"),
     ("robot", "bundled"),
@@ -20,9 +20,9 @@ ORDER = (
     ("signals", "moments", "moments_file", "accumulation"),
     ("identifiability",),
     ("estimation", "projection", "excitation"),
-    ("uncertainty",),
+    ("uncertainty", "simulation"),
+    ("model",),
     ("identification",),
-    ("simulation",),
     ("validation",),
     ("report",),
     ("cli",),

@@ -40,7 +40,10 @@ if TYPE_CHECKING:
     from casysid.identification import IdentificationResult
 
 
-FILES = ("result.json", "identified.urdf", "identified.xml", "moments.npz", "report.html")
+FILES = (
+    *("result.json", "identified.urdf", "identified.xml", "drive.yaml"),
+    *("model.json", "model.npz", "moments.npz", "report.html"),
+)
 SMALLEST_RUN = 2**15
 """Less than any run takes: that of two joints, without a choice of the low-pass, takes 108 kB [bytes]."""
 
