@@ -29,8 +29,11 @@ if TYPE_CHECKING:
     from casysid.identification.many import identify_fleet as identify_fleet
     from casysid.identification.many import identify_many as identify_many
     from casysid.identification.output import write_result as write_result
+    from casysid.identification.saved import SavedResult as SavedResult
+    from casysid.identification.saved import read_result as read_result
     from casysid.inertia import Consistency as Consistency
     from casysid.kinematics import Kinematics as Kinematics
+    from casysid.model import RobotModel as RobotModel
     from casysid.moments import Moments as Moments
     from casysid.reaching import InverseKinematics as InverseKinematics
     from casysid.reaching import LookAt as LookAt
@@ -66,6 +69,8 @@ _HOMES = {
     "Recording": "casysid.recording",
     "Ridge": "casysid.estimation",
     "Robot": "casysid.robot",
+    "RobotModel": "casysid.model",
+    "SavedResult": "casysid.identification.saved",
     "Settings": "casysid.identification",
     "WeightedLeastSquares": "casysid.estimation",
     "build_dynamics": "casysid.dynamics",
@@ -83,6 +88,7 @@ _HOMES = {
     "prepare": "casysid.identification",
     "read_recording": "casysid.recording",
     "read_recordings": "casysid.recording",
+    "read_result": "casysid.identification.saved",
     "rehearse": "casysid.validation",
     "simulate": "casysid.simulation",
     "write_excitation": "casysid.excitation",

@@ -53,6 +53,8 @@ class ParameterUncertainty:
         freedom: Degrees of freedom; inf where not known.
         non_negative: Which of the p parameters cannot be negative, shape (p,).
         spread: Of the estimate before the projection: what the data see, and what they decided.
+        hidden: Basis of the directions that neither data nor knowledge tell, shape (p, k), in units of the spread's
+            scale.
     """
 
     parameters: Array
@@ -63,9 +65,10 @@ class ParameterUncertainty:
     freedom: float
     non_negative: Array
     spread: Spread
+    hidden: Array
 
     def __post_init__(self) -> None:
-        for name in ("parameters", "covariance", "std", "links", "link_std"):
+        for name in ("parameters", "covariance", "std", "links", "link_std", "hidden"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def quantile(self, level: float = 0.95) -> float:
@@ -190,6 +193,7 @@ def _uncertainty(
         freedom=spread.freedom,
         non_negative=non_negative,
         spread=spread,
+        hidden=told.hidden,
     )
 
 

@@ -12,7 +12,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "casysid"
 ORDER = (
-    ("errors", "arrays", "archives", "memory", "threads"),
+    ("errors", "arrays", "archives", "json_reading", "memory", "threads"),
     ("outputs",),
     ("nlp", "inertia"),
     ("robot", "bundled"),
@@ -21,9 +21,9 @@ ORDER = (
     ("identifiability",),
     ("estimation", "projection", "excitation"),
     ("reaching",),
-    ("uncertainty",),
+    ("uncertainty", "simulation"),
+    ("model",),
     ("identification",),
-    ("simulation",),
     ("validation",),
     ("report",),
     ("cli",),

@@ -52,6 +52,7 @@ NO_DOORS = {
     "read_earlier_result": "a file",
     "read_recording": "load_recording is its door",
     "read_recordings": "load_recording is its door",
+    "read_result": "files",
     "total_mass": "what is known, in words",
     "write_excitation": "design.check and describe are its doors",
     "write_rehearsal": "a file",

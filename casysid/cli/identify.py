@@ -56,7 +56,11 @@ if TYPE_CHECKING:
     from casysid.robot import Robot
 
 
-FILES = ("result.json", "identified.urdf", "identified.xml", "moments.npz", "report.html", "fleet.json", "fleet.csv")
+FILES = (
+    *("result.json", "identified.urdf", "identified.xml", "drive.yaml"),
+    *("model.json", "model.npz", "moments.npz", "report.html"),
+    *("fleet.json", "fleet.csv"),
+)
 SMALLEST_RUN = 2**15
 """Less than any run takes: that of two joints, without a choice of the low-pass, takes 108 kB [bytes]."""
 

@@ -34,7 +34,20 @@ _FLAGS = (
 _SECONDS = 120.0
 _FAILURES = (OSError, RuntimeError, AttributeError, subprocess.SubprocessError)
 
-_PROLOGUE = """\
+HELPERS = """\
+static inline double sign(double x) { return (x > 0) - (x < 0); }
+static inline double less(double x, double y) { return x < y; }
+static inline double less_equal(double x, double y) { return x <= y; }
+static inline double equal(double x, double y) { return x == y; }
+static inline double not_equal(double x, double y) { return x != y; }
+static inline double logical_and(double x, double y) { return x && y; }
+static inline double logical_or(double x, double y) { return x || y; }
+static inline double logical_not(double x) { return !x; }
+static inline double if_else_zero(double x, double y) { return x ? y : 0; }
+"""
+"""What operations need beside C's own and ``math.h``."""
+
+_PROLOGUE = f"""\
 #include <math.h>
 #include <stddef.h>
 #if defined(__AVX512F__)
@@ -46,19 +59,10 @@ _PROLOGUE = """\
 #endif
 typedef double vec __attribute__((vector_size(8 * LANES)));
 typedef double row __attribute__((vector_size(8 * LANES), aligned(8), may_alias));
-static inline double sign(double x) { return (x > 0) - (x < 0); }
-static inline double less(double x, double y) { return x < y; }
-static inline double less_equal(double x, double y) { return x <= y; }
-static inline double equal(double x, double y) { return x == y; }
-static inline double not_equal(double x, double y) { return x != y; }
-static inline double logical_and(double x, double y) { return x && y; }
-static inline double logical_or(double x, double y) { return x || y; }
-static inline double logical_not(double x) { return !x; }
-static inline double if_else_zero(double x, double y) { return x ? y : 0; }
-#define EACH(call) ({ vec r; for (int l = 0; l < LANES; ++l) r[l] = call; r; })
-#define BROADCAST(x) ((vec){0} + (x))
-void kernel(const double *x, double *y, ptrdiff_t n) {
-for (ptrdiff_t k = 0; k < n; k += LANES) {
+{HELPERS}#define EACH(call) ({{ vec r; for (int l = 0; l < LANES; ++l) r[l] = call; r; }})
+#define BROADCAST(x) ((vec){{0}} + (x))
+void kernel(const double *x, double *y, ptrdiff_t n) {{
+for (ptrdiff_t k = 0; k < n; k += LANES) {{
 """
 
 

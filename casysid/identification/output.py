@@ -6,9 +6,11 @@ import hashlib
 import json
 from pathlib import Path
 
-from casysid.identification.plain_friction import nearest_plain_friction
-from casysid.identification.result import JOINT_KINDS, IdentificationResult, without_infinities
+from casysid.identification.plain_friction import homeless_columns
+from casysid.identification.result import IdentificationResult, without_infinities
 from casysid.identification.verdict import judge
+from casysid.model import write_model
+from casysid.model.drive_yaml import DRIVE_FILE, drive_yaml
 from casysid.moments_file import write_moments
 from casysid.outputs import Stage, run_folder, write_whole
 from casysid.robot import write_robot
@@ -17,9 +19,11 @@ from casysid.robot import write_robot
 def write_result(
     result: IdentificationResult, directory: str | Path, *, export_inconsistent: bool = False
 ) -> tuple[str, ...]:
-    """Write ``result.json``, ``moments.npz``, and ``identified.urdf`` or ``identified.xml`` into a directory.
+    """Write ``result.json``, ``moments.npz``, the model, and ``identified.urdf`` or ``identified.xml`` into a folder.
 
-    Files of an earlier run there go, its report too; files of others stay.
+    :func:`~casysid.identification.saved.read_result` reads it back. Beside a URDF, which has no place for them,
+    armature and all other numbers of the drives are in ``drive.yaml``. Files of an earlier run there go, its report
+    too; files of others stay.
 
     Returns:
         What a person should know about the written model, one sentence each.
@@ -42,6 +46,9 @@ def add_result(result: IdentificationResult, stage: Stage, *, export_inconsisten
         "model_notes": list(notes),
     }
     write_moments(result.moments, stage.folder / "moments.npz")
+    write_model(result.model, stage.folder)
+    if result.robot.source_format == "urdf":
+        (stage.folder / DRIVE_FILE).write_text(drive_yaml(result.model), encoding="utf-8")
     write_json(content, stage.folder / "result.json")
     return notes
 
@@ -73,15 +80,14 @@ def _write_model(result: IdentificationResult, stage: Stage, export_inconsistent
     path = model_path(result, stage.home)
     if not (result.is_physically_consistent or export_inconsistent):
         return (f"{path.name} is withheld because the parameters are not physically consistent.",)
-    homeless = _homeless(result)
-    plain = nearest_plain_friction(result.regressor, result.parameters, result.moments, homeless)
+    homeless, model = homeless_columns(result.regressor), result.model
     written = write_robot(
         result.robot,
         path,
-        result.inertial_parameters.ravel(),
-        damping=plain["viscous"],
-        dry_friction=plain["coulomb"],
-        armature=result.drive_vector("armature"),
+        result.inertial_parameters,
+        damping=model.damping,
+        dry_friction=model.dry_friction,
+        armature=model.armature,
         keep_as=stage.folder / path.name,
     )
     if not homeless:
@@ -91,12 +97,3 @@ def _write_model(result: IdentificationResult, stage: Stage, export_inconsistent
         "viscous and Coulomb friction are those that come nearest to the whole."
     )
     return (*written.notes, note)
-
-
-def _homeless(result: IdentificationResult) -> list[str]:
-    """Names of the drive columns that a robot file has no place for."""
-    return [
-        parameter.name
-        for parameter in result.regressor.parameters[10 * len(result.robot.links) :]
-        if parameter.kind not in JOINT_KINDS or parameter.owner not in result.robot.dofs
-    ]

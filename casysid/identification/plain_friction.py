@@ -11,7 +11,18 @@ from casysid.arrays import Array
 from casysid.dynamics import Coulomb, Offset, Regressor, Viscous
 from casysid.moments import Moments
 
+JOINT_KINDS = ("viscous", "coulomb", "offset", "armature")
+"""Parameters of a drive that every joint may have, and a robot file or a report has a place for."""
 PLAIN = (Viscous.kind, Coulomb.kind)
+
+
+def homeless_columns(regressor: Regressor) -> list[str]:
+    """Names of the drive columns that a robot file has no place for."""
+    return [
+        parameter.name
+        for parameter in regressor.parameters[10 * len(regressor.robot.links) :]
+        if parameter.kind not in JOINT_KINDS or parameter.owner not in regressor.robot.dofs
+    ]
 
 
 def nearest_plain_friction(

@@ -19,6 +19,8 @@ from casysid.identification.friction_laws import broken_laws
 from casysid.identification.friction_model import model_to_json
 from casysid.identification.links import LinkProperties, link_properties
 from casysid.identification.mistakes import Mistake
+from casysid.identification.plain_friction import JOINT_KINDS as JOINT_KINDS
+from casysid.identification.plain_friction import homeless_columns, nearest_plain_friction
 from casysid.identification.prediction import TorqueError
 from casysid.identification.settings import Settings
 from casysid.identification.sources import Sources, sources_of
@@ -28,13 +30,12 @@ from casysid.identification.tuning.delay import DelayChoice
 from casysid.identification.tuning.drive_gains import DriveGains
 from casysid.identification.tuning.friction_selection import FrictionChoice
 from casysid.inertia import smallest_eigenvalue
+from casysid.model import RobotModel, Scatter
 from casysid.moments import Moments
 from casysid.projection import ProjectionResult
 from casysid.robot import Robot
 from casysid.signals import InputNoise, Motion
 from casysid.uncertainty import ParameterUncertainty
-
-JOINT_KINDS = ("viscous", "coulomb", "offset", "armature")
 
 
 def is_dry(kind: str) -> bool:
@@ -42,7 +43,7 @@ def is_dry(kind: str) -> bool:
     return kind in (Coulomb.kind, SharpCoulomb.kind) or kind.startswith(MaxwellSlip.kind)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class IdentificationResult:
     """Identified parameters of a robot and how far they can be trusted.
 
@@ -86,6 +87,25 @@ class IdentificationResult:
     held_out_motions: tuple[Motion, ...]
     input_noise: InputNoise | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        kind, told = ("held-out", self.held_out) if self.held_out else ("fitted", self.train)
+        return (
+            f"<IdentificationResult of '{self.robot.name}': {len(self.parameters)} parameters by "
+            f"{self.estimate.method}, torque error {100.0 * told.relative:.3g} % on {kind} recordings>"
+        )
+
+    @cached_property
+    def model(self) -> RobotModel:
+        """The identified dynamics: torques with standard errors, CasADi, C, Pinocchio, MuJoCo."""
+        plain = nearest_plain_friction(self.regressor, self.parameters, self.moments, homeless_columns(self.regressor))
+        return RobotModel(
+            regressor=self.regressor,
+            parameters=self.parameters,
+            scatter=Scatter(self.uncertainty.covariance, self.uncertainty.hidden, self.uncertainty.spread.scale),
+            damping=plain["viscous"],
+            dry_friction=plain["coulomb"],
+        )
 
     @property
     def parameters(self) -> Array:
@@ -150,13 +170,13 @@ class IdentificationResult:
 
     @property
     def inertial_parameters(self) -> Array:
-        """The links' parameters, shape (links, 10)."""
-        return self.parameters[: 10 * len(self.robot.links)].reshape(-1, 10)
+        """The links' parameters, shape (10 links,), as all functions take them; ``reshape(-1, 10)`` is link by link."""
+        return self.parameters[: 10 * len(self.robot.links)]
 
     @property
     def smallest_pseudo_inertia_eigenvalue(self) -> float:
         """Over all links; not negative exactly when some distribution of mass has these parameters."""
-        return float(smallest_eigenvalue(self.inertial_parameters).min())
+        return float(smallest_eigenvalue(self.inertial_parameters.reshape(-1, 10)).min())
 
     @property
     def negative_drive_parameters(self) -> tuple[str, ...]:
@@ -177,7 +197,7 @@ class IdentificationResult:
     @property
     def inconsistent_links(self) -> tuple[str, ...]:
         """Links whose pseudo-inertia is not positive definite."""
-        smallest = smallest_eigenvalue(self.inertial_parameters)
+        smallest = smallest_eigenvalue(self.inertial_parameters.reshape(-1, 10))
         return tuple(link for link, value in zip(self.robot.links, smallest, strict=True) if not value > 0.0)
 
     def links(self) -> tuple[LinkProperties, ...]:

@@ -103,6 +103,9 @@ class Robot:
     floating_base: bool = False
     locked: tuple[tuple[str, float], ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<Robot '{self.name}': {self.nv} degrees of freedom, {len(self.links)} links, from {self.source.name}>"
+
     @property
     def nq(self) -> int:
         """Length of Pinocchio's configuration."""

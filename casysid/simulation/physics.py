@@ -67,8 +67,13 @@ class Physics:
     timestep: float
 
 
-def build_machine(robot: Robot, physics: Physics) -> Machine:
+def build_machine(robot: Robot, physics: Physics, *, named: bool = False) -> Machine:
     """The robot as a MuJoCo model with one motor per degree of freedom.
+
+    Args:
+        robot: The tree.
+        physics: What it is made of.
+        named: Whether bodies, joints and motors have the robot's names, which strangers chose, instead of numbers.
 
     Raises:
         RobotError: A link's parameters are not those of a body that could move.
@@ -82,14 +87,18 @@ def build_machine(robot: Robot, physics: Physics) -> Machine:
     option.disableflags = disable.mjDSBL_CONTACT | disable.mjDSBL_LIMIT | disable.mjDSBL_AUTORESET
     inertias = _checked_inertias(robot, physics.parameters)
     bodies: list[Any] = []
+    names: list[list[str]] = []
     for k, joint in enumerate(robot.joints):
         parent = spec.worldbody if joint.parent < 0 else bodies[joint.parent]
-        bodies.append(_add_body(parent, f"body{k}", joint.placement, inertias[k]))
-        for i, motion in enumerate(_PATTERN[joint.kind]):
-            _add_joint(spec, bodies[-1], joint, f"joint{k}.{i}", motion, i, physics)
+        pattern = _PATTERN[joint.kind]
+        body, root = (joint.link or f"{joint.name} frame", joint.name) if named else (f"body{k}", f"joint{k}")
+        names.append([root if named and len(pattern) == 1 else f"{root}.{i}" for i in range(len(pattern))])
+        bodies.append(_add_body(parent, body, joint.placement, inertias[k]))
+        for i, motion in enumerate(pattern):
+            _add_joint(spec, bodies[-1], joint, names[-1][i], motion, i, physics)
     model = spec.compile()
-    machine = Machine(model, *_addresses(model, robot))
-    _set_numbers(machine, robot, physics, inertias)
+    machine = Machine(model, *_addresses(model, robot, names))
+    _set_numbers(machine, robot, physics, inertias, [bodies[k].name for k in range(len(bodies))])
     return machine
 
 
@@ -129,7 +138,10 @@ def _add_joint(spec: Any, body: Any, joint: Joint, name: str, motion: str, i: in
     for axis_index in range(3 if motion == "b" else 1):
         gear = np.eye(6)[axis_index]
         motor = spec.add_actuator(
-            name=f"{name}.{axis_index}", target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, gear=gear
+            name=f"{name}.{axis_index}" if motion == "b" else name,
+            target=name,
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            gear=gear,
         )
         limit = physics.effort[joint.v.start + i + axis_index]
         if np.isfinite(limit):
@@ -138,26 +150,26 @@ def _add_joint(spec: Any, body: Any, joint: Joint, name: str, motion: str, i: in
             motor.dyntype, motor.dynprm = mujoco.mjtDyn.mjDYN_FILTER, np.r_[physics.lag, np.zeros(9)]
 
 
-def _addresses(model: Any, robot: Robot) -> tuple[Any, Any]:
+def _addresses(model: Any, robot: Robot, names: list[list[str]]) -> tuple[Any, Any]:
     """Where channels and rates are in qpos and qvel: MuJoCo orders bodies depth first and quaternions w first."""
     positions, rates = [], []
     for k, joint in enumerate(robot.joints):
         for i, motion in enumerate(_PATTERN[joint.kind]):
-            mj_joint = model.joint(f"joint{k}.{i}")
+            mj_joint = model.joint(names[k][i])
             q, v = int(mj_joint.qposadr[0]), int(mj_joint.dofadr[0])
             positions += [q + 1, q + 2, q + 3, q] if motion == "b" else [q]
             rates += [v, v + 1, v + 2] if motion == "b" else [v]
     return np.array(positions), np.array(rates)
 
 
-def _set_numbers(machine: Machine, robot: Robot, physics: Physics, inertias: list[Any]) -> None:
+def _set_numbers(machine: Machine, robot: Robot, physics: Physics, inertias: list[Any], bodies: list[str]) -> None:
     """Write what the compiler would round, refuse or spread over a whole ball joint."""
     import mujoco
 
     model, rates = machine.model, machine.rates
     for k, inertia in enumerate(inertias):
         if inertia is not None:
-            model.body(f"body{k}").inertia[:] = _principal(inertia)[0]
+            model.body(bodies[k]).inertia[:] = _principal(inertia)[0]
     viscous, coulomb, _, armature = drive_parameters(robot, physics.parameters)
     for joint in robot.joints:
         if joint.kind in (JointKind.PLANAR, JointKind.FREE_FLYER):

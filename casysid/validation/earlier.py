@@ -10,7 +10,7 @@ from typing import Any
 from casysid.dynamics import FrictionModel
 from casysid.errors import ParameterError
 from casysid.identification.friction_model import model_from_json
-from casysid.validation.earlier_json import check_numbers, number, numbers_by_name, object_at, read_json, texts
+from casysid.json_reading import check_numbers, number, numbers_by_name, object_at, read_json, texts
 
 SMALLEST_GAIN = 1e-6
 """Of torque: as from N m to mega-newton metres."""

@@ -202,7 +202,8 @@ def test_another_run_replaces_the_files_of_the_one_before(log, tmp_path):
     for split in ("0.5", "0.6"):
         answer = run("identify", URDF, log, "--split", split, "--cutoff", "12", "--method", "wls", "--out", out)
         assert answer.exit_code == 0, answer.output
-    written = {"result.json", "identified.urdf", "moments.npz", "report.html", ".casysid.json"}
+    model = {"model.json", "model.npz", "drive.yaml"}
+    written = {"result.json", "identified.urdf", *model, "moments.npz", "report.html", ".casysid.json"}
     assert {path.name for path in out.iterdir()} == {*written, "notes.txt"}
     listed = json.loads((out / ".casysid.json").read_text())["files"]
     for name in written - {".casysid.json"}:

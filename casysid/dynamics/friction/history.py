@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Any
 
+import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
@@ -22,6 +24,17 @@ class History(ABC):
             time: [s], or the samples' numbers, shape (N,).
             position: Along the direction, shape (N,); an angle goes on beyond a turn.
         """
+
+    def slid(self, velocity: Any) -> Any:
+        """The signal after a long way in the direction of a velocity, CasADi expressions; zero unless a kind says else.
+
+        It stands for what is remembered where a state is given without those before it.
+        """
+        return 0.0 * velocity
+
+    def moved(self, signal: Any, way: Any) -> Any:
+        """The signal one sample later, after a way along the direction, CasADi expressions; the same if not said."""
+        return signal
 
 
 @dataclass(frozen=True)
@@ -50,6 +63,14 @@ class Play(History):
             stretch.append(min(max(stretch[-1] + moved, -1.0), 1.0))
         last = np.searchsorted(turns, np.arange(len(x)), side="right") - 1
         return np.asarray(np.clip(np.array(stretch)[last] + x - x[turns[last]], -1.0, 1.0))
+
+    def slid(self, velocity: Any) -> Any:
+        """Stretched as far as it goes; slack at rest."""
+        return ca.sign(velocity)
+
+    def moved(self, signal: Any, way: Any) -> Any:
+        """The stretch one sample later."""
+        return ca.fmin(ca.fmax(signal + way / self.displacement, -1.0), 1.0)
 
 
 @dataclass(frozen=True)

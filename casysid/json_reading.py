@@ -1,4 +1,4 @@
-"""The JSON of an identification, read with suspicion: what is not as it should be is named by its path."""
+"""JSON of an identification, read with suspicion: what is not as it should be is named by its path."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ DEEPEST = 20
 """Objects and lists within each other; a result has six."""
 
 
-def read_json(path: Path) -> Mapping[str, Any]:
+def read_json(path: str | Path) -> Mapping[str, Any]:
     """The object in a JSON file.
 
     Raises:
         ValueError: It is too large, too deep, no JSON, or no object.
         OSError: It cannot be read.
     """
+    path = Path(path)
     if not path.is_file():
         raise ValueError("there is no such file")
     if path.stat().st_size > LARGEST_FILE:
