@@ -30,7 +30,11 @@ if TYPE_CHECKING:
     from casysid.identification.many import identify_many as identify_many
     from casysid.identification.output import write_result as write_result
     from casysid.inertia import Consistency as Consistency
+    from casysid.kinematics import Kinematics as Kinematics
     from casysid.moments import Moments as Moments
+    from casysid.reaching import InverseKinematics as InverseKinematics
+    from casysid.reaching import LookAt as LookAt
+    from casysid.reaching import PoseTarget as PoseTarget
     from casysid.recording import Recording as Recording
     from casysid.recording import open_recording as open_recording
     from casysid.recording import open_recordings as open_recordings
@@ -52,9 +56,13 @@ _HOMES = {
     "Coupling": "casysid.dynamics",
     "ErrorsInVariables": "casysid.estimation",
     "IdentificationResult": "casysid.identification",
+    "InverseKinematics": "casysid.reaching",
+    "Kinematics": "casysid.kinematics",
+    "LookAt": "casysid.reaching",
     "Moments": "casysid.moments",
     "OrdinaryLeastSquares": "casysid.estimation",
     "Plant": "casysid.simulation",
+    "PoseTarget": "casysid.reaching",
     "Recording": "casysid.recording",
     "Ridge": "casysid.estimation",
     "Robot": "casysid.robot",

@@ -52,7 +52,7 @@ def run(command, folder):
 
 
 def test_every_block_says_what_it_is():
-    assert {language for language, _ in BLOCKS} == {"sh", "python", "text"}
+    assert {language for language, _ in BLOCKS} == {"sh", "python", "text", "toml"}
     every = [line for language, code in BLOCKS if language == "sh" for line in words(code)]
     assert NOT_RUN.keys() <= set(every)
     assert every[len(NOT_RUN)] == "source .venv/bin/activate"

@@ -8,6 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from casysid.cli.log_options import (
+    ConstantOption,
+    EfficiencyOption,
+    GearOption,
+    MapOption,
+    UnitsOption,
+    declared_of,
+)
 from casysid.cli.options import (
     AccelerationNoiseOption,
     ByOption,
@@ -44,6 +52,7 @@ if TYPE_CHECKING:
 
     from casysid.identification import IdentificationResult, Settings
     from casysid.identification.many import Fleet
+    from casysid.recording import Declared
     from casysid.robot import Robot
 
 
@@ -70,6 +79,11 @@ def identify(
     noise_velocity: VelocityNoiseOption = None,
     noise_acceleration: AccelerationNoiseOption = None,
     friction: FrictionOption = FrictionWord.AUTO,
+    units: UnitsOption = None,
+    columns: MapOption = None,
+    motor_constant: ConstantOption = None,
+    gear: GearOption = None,
+    efficiency: EfficiencyOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
     floating_base: FloatingOption = False,
@@ -89,18 +103,20 @@ def identify(
         from casysid.identification.many.output import add_fleet, fleet_rows
         from casysid.identification.output import add_result, identity_of
         from casysid.outputs import check_run_folder
+        from casysid.readers.table import holds_logs
         from casysid.report import add_report
 
         check_run_folder(out, FILES, SMALLEST_RUN)
         noise = noise_levels(noise_position, noise_velocity, noise_acceleration)
         settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise, friction, flip)
+        said = declared_of(units, columns, motor_constant, gear, efficiency)
         model = load_robot(robot, gravity, lock, floating_base)
-        many = scheduler is not None or by is not None or any(log.is_dir() for log in logs)
-        fitted, unseen = ([], []) if many else load_recordings(model, logs, held_out, split)
+        many = scheduler is not None or by is not None or any(map(holds_logs, logs))
+        fitted, unseen = ([], []) if many else load_recordings(model, logs, held_out, split, said)
         fleet = None
         with progress_bar(console) as progress:
             if many:
-                result, fleet = _run_many(model, logs, settings, held_out, split, scheduler, by, progress)
+                result, fleet = _run_many(model, logs, settings, held_out, split, said, scheduler, by, progress)
             else:
                 result = run(model, fitted, settings, held_out=unseen, progress=progress)
             progress("write", 0.0)
@@ -123,6 +139,7 @@ def _run_many(
     settings: Settings,
     held_out: list[Path] | None,
     split: float | None,
+    said: Declared,
     scheduler: str | None,
     by: str | None,
     progress: Callable[[str, float], None],
@@ -130,7 +147,9 @@ def _run_many(
     """The answer of many recordings, and the machines where they are told apart."""
     from casysid.identification.many import identify_fleet, identify_many
 
-    options: dict[str, Any] = dict(held_out=held_out or (), split=split, scheduler=scheduler, progress=progress)
+    options: dict[str, Any] = dict(
+        held_out=held_out or (), split=split, declared=said, scheduler=scheduler, progress=progress
+    )
     check_options(split=split)
     if by is None:
         return identify_many(robot, logs, settings, **options), None

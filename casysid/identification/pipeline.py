@@ -31,9 +31,17 @@ from casysid.identification.tuning.drive_gains import choose_drive_gains
 from casysid.identification.tuning.friction_selection import FrictionChoice, fit_model, select_friction
 from casysid.identification.tuning.ripples import ripple_uses
 from casysid.moments import Moments
-from casysid.projection import PossibleParameters, ProjectionProblem, ProjectionResult, build_projection, project
+from casysid.projection import (
+    KeptLink,
+    PossibleParameters,
+    ProjectionProblem,
+    ProjectionResult,
+    build_projection,
+    project,
+)
 from casysid.recording import Source
 from casysid.robot import Robot
+from casysid.robot.likely_bodies import believed
 from casysid.signals import InputNoise, Motion
 from casysid.signals.admission import FEWEST, FEWEST_TO_PREDICT, check_noise, check_recordings
 from casysid.threads import single_threaded
@@ -54,9 +62,9 @@ class Preparation:
     """All that is read from the data: what every estimator starts from.
 
     Attributes:
-        robot: The robot.
+        robot: The robot as its file has it.
         choices: What was chosen on the way.
-        regressor: With the friction that was chosen.
+        regressor: With the friction that was chosen; its prior is the file's without what no body can be.
         moments: Of the fitted recordings, with what noise added if some method needs it.
         motions: Of the fitted recordings, or of excerpts of long ones.
         held_out: Motions that are only predicted, alike.
@@ -145,7 +153,10 @@ def prepare(
     places = places_by_content(fitted)
     fitted = tuple(fitted[place] for place in places)
     progress("tuning", 0.0)
-    chosen = _choose(robot, fitted, settings, progress, mapped)
+    witness = believed(robot, [known.link for known in settings.knowledge if isinstance(known, KeptLink)])
+    if witness.sentence:
+        warnings.warn(witness.sentence, CasysidWarning, stacklevel=3)
+    chosen = _choose(witness.robot, fitted, settings, progress, mapped)
     clock.lap("tuning")
     progress("moments", 0.0)
     regressor, moments, passes = chosen.regressor, chosen.moments, chosen.passes
@@ -154,7 +165,7 @@ def prepare(
         moments, noise = with_noise(moments, regressor, passes, settings.input_noise)
     scale, delay, band = chosen.choices.clock.scale, chosen.choices.delay, chosen.choices.band
     later = [one.with_time_scaled(scale) for one in held_out]
-    unseen = Passes(robot, later, band, delays=delay.seconds, mapped=mapped)
+    unseen = Passes(witness.robot, later, band, delays=delay.seconds, mapped=mapped)
     structural = structural_base_parameters(regressor)
     clock.lap("moments")
     progress("moments", 1.0)
@@ -199,7 +210,8 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
     parameters = estimate.parameters if projection is None else projection.parameters
     band = preparation.choices.band.errors
     passes, unseen = preparation.passes, preparation.unseen
-    vectors = [parameters, estimate.parameters, prior]
+    own = preparation.robot.inertial_parameters
+    vectors = [parameters, estimate.parameters, np.concatenate([own, prior[own.size :]])]
     fitted = [parameters] if unseen else vectors
     errors = tuple(one.as_given(preparation.places) for one in passes.errors(regressor, fitted, band))
     judged = unseen.errors(regressor, vectors, band) if unseen else errors

@@ -9,8 +9,9 @@ import numpy as np
 
 from casysid.errors import RecordingError
 from casysid.readers.parquet import ParquetTable
+from casysid.readers.streams import open_lines
 from casysid.readers.table import open_table
-from casysid.readers.text import TextTable, open_lines
+from casysid.readers.text import TextTable
 
 
 def constant_of(path: Path, column: str) -> str:
@@ -58,8 +59,8 @@ def _of_parquet(table: ParquetTable, column: str) -> Iterator[object]:
 
 
 def _of_text(table: TextTable, column: str) -> Iterator[object]:
-    place = table.names.index(column)
-    with open_lines(table.path) as lines:
+    place = table.header.names.index(column)
+    with open_lines(table.path, table.header.encoding) as lines:
         for row in table.rows(lines):
             yield row[place].strip() if place < len(row) else ""
 

@@ -297,10 +297,12 @@ def test_a_bad_log_is_one_message(logs):
 @pytest.fixture(scope="module")
 def cluster():
     """Two processes that a scheduler hands work to."""
-    distributed = pytest.importorskip("distributed")
+    distributed, before = pytest.importorskip("distributed"), dict(os.environ)
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=2, dashboard_address=":0", silence_logs=logging.CRITICAL
     ) as running:
+        os.environ.clear()
+        os.environ.update(before)  # without what Dask has set for its workers
         yield running
 
 
@@ -331,5 +333,7 @@ def test_what_goes_wrong_at_workers_is_one_message(cluster, logs, monkeypatch):
 @pytest.mark.slow
 def test_processes_of_this_machine_are_started_for_the_work():
     pytest.importorskip("distributed")
+    before = dict(os.environ)
     with open_workers("local", workers=2) as workers:
         assert workers(abs, [-1, 2, -3]) == [1, 2, 3]
+    assert dict(os.environ) == before

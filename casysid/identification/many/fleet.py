@@ -24,6 +24,8 @@ from casysid.identification.pipeline import Progress, fit, silent, solve
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 from casysid.moments import Moments
+from casysid.recording import Declared
+from casysid.recording.declared import NOTHING
 from casysid.robot import Robot
 from casysid.threads import single_threaded
 
@@ -105,6 +107,7 @@ def identify_fleet(
     *,
     held_out: Logs = (),
     split: float | None = None,
+    declared: Declared = NOTHING,
     scheduler: str | Workers | None = None,
     progress: Progress = silent,
 ) -> Fleet:
@@ -117,6 +120,7 @@ def identify_fleet(
         settings: As for :func:`~casysid.identification.many.identify_many`; what the data decide is decided by all.
         held_out: Predicted by the model of all together.
         split: Likewise.
+        declared: Likewise.
         scheduler: Likewise.
         progress: Likewise.
 
@@ -127,7 +131,9 @@ def identify_fleet(
     """
     settings = settings or Settings()
     with nullcontext(scheduler) if isinstance(scheduler, Workers) else open_workers(scheduler) as workers:
-        many = prepare_many(robot, logs, settings, workers, held_out=held_out, split=split, by=by, progress=progress)
+        many = prepare_many(
+            robot, logs, settings, workers, held_out=held_out, split=split, declared=declared, by=by, progress=progress
+        )
         preparation = many.preparation
         regressor, parts = (
             preparation.regressor,

@@ -12,7 +12,8 @@ from pathlib import Path
 from casysid.errors import CasysidWarning, RecordingError
 from casysid.identification.many.compact import compact
 from casysid.identification.many.workers import Workers
-from casysid.recording import RecordingFile
+from casysid.recording import Declared, RecordingFile
+from casysid.recording.declared import NOTHING
 from casysid.robot import Robot
 
 BY_RECORDING = "recording"
@@ -46,19 +47,19 @@ def find_logs(logs: Logs) -> tuple[Path, ...]:
     Raises:
         RecordingError: There is no log, or one is given twice.
     """
-    from casysid.readers.table import SUFFIXES, suffix_of
+    from casysid.readers.table import SUFFIXES, holds_logs, suffix_of
 
     found = list[Path]()
     for one in (logs,) if isinstance(logs, (str, Path)) else logs:
         path = Path(one)
-        if path.is_dir():
+        if holds_logs(path):
             inside = [
                 file
                 for file in path.rglob("*")
                 if file.is_file() and file.name[0] not in "._" and suffix_of(file) in SUFFIXES
             ]
             if not inside:
-                raise RecordingError(f"{path}: no log in this folder; wanted files of {', '.join(SUFFIXES)}")
+                raise RecordingError(f"{path}: no log in this folder; wanted files of {', '.join(READ)}")
             found += sorted(inside)
         elif not path.exists() and glob.has_magic(str(one)):
             matching = sorted(map(Path, glob.glob(str(one), recursive=True)))
@@ -75,7 +76,13 @@ def find_logs(logs: Logs) -> tuple[Path, ...]:
 
 
 def open_logs(
-    robot: Robot, files: Sequence[Path], workers: Workers, *, by: str | None = None, split: float | None = None
+    robot: Robot,
+    files: Sequence[Path],
+    workers: Workers,
+    *,
+    by: str | None = None,
+    split: float | None = None,
+    declared: Declared = NOTHING,
 ) -> tuple[Opened, ...]:
     """Open every log on a worker, and bring back what is known of it.
 
@@ -85,6 +92,7 @@ def open_logs(
         workers: Open them.
         by: Column whose constant value names the machine, a ``NAME=value`` folder of a data set, or ``recording``.
         split: Share of each recording's time that is fitted, the rest held out; None fits all.
+        declared: What is known of the logs: units, columns, drives.
 
     Warns:
         CasysidWarning: For everything doubtful that leaves a recording usable.
@@ -92,17 +100,17 @@ def open_logs(
     Raises:
         RecordingError: If one cannot be used.
     """
-    opened = tuple(workers(partial(_opened, robot, by, split), files))
+    opened = tuple(workers(partial(_opened, robot, by, split, declared), files))
     for path, one in zip(files, opened, strict=True):
         for weakness in one.weaknesses:
             warnings.warn(f"{path}: {weakness}", CasysidWarning, stacklevel=2)
     return opened
 
 
-def _opened(robot: Robot, by: str | None, split: float | None, path: Path) -> Opened:
+def _opened(robot: Robot, by: str | None, split: float | None, declared: Declared, path: Path) -> Opened:
     from casysid.readers.loading import scan_recording
 
-    recording, weaknesses = scan_recording(path, robot)
+    recording, weaknesses = scan_recording(path, robot, declared)
     fitted, held_out = (recording, None) if split is None else recording.split(split)
     return Opened(compact(fitted), None if held_out is None else compact(held_out), _machine_of(path, by), weaknesses)
 

@@ -15,6 +15,8 @@ from casysid.identification.many.workers import Workers, open_workers
 from casysid.identification.pipeline import Preparation, Progress, prepare, silent, solve
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
+from casysid.recording import Declared
+from casysid.recording.declared import NOTHING
 from casysid.robot import Robot
 from casysid.threads import single_threaded
 
@@ -40,6 +42,7 @@ def identify_many(
     *,
     held_out: Logs = (),
     split: float | None = None,
+    declared: Declared = NOTHING,
     scheduler: str | Workers | None = None,
     progress: Progress = silent,
 ) -> IdentificationResult:
@@ -54,6 +57,7 @@ def identify_many(
         settings: Hyperparameters; the defaults let the data decide.
         held_out: Logs that are only predicted.
         split: Share of each recording's time that is fitted, the rest only predicted; None fits all.
+        declared: What is known of the logs: units, columns, drives.
         scheduler: Address of a Dask scheduler; None for processes on this machine; or workers that are open already.
         progress: Called with the stage and the share done.
 
@@ -64,7 +68,9 @@ def identify_many(
     """
     settings = settings or Settings()
     with nullcontext(scheduler) if isinstance(scheduler, Workers) else open_workers(scheduler) as workers:
-        many = prepare_many(robot, logs, settings, workers, held_out=held_out, split=split, progress=progress)
+        many = prepare_many(
+            robot, logs, settings, workers, held_out=held_out, split=split, declared=declared, progress=progress
+        )
         return solve(many.preparation, settings, progress=progress)
 
 
@@ -77,6 +83,7 @@ def prepare_many(
     *,
     held_out: Logs = (),
     split: float | None = None,
+    declared: Declared = NOTHING,
     by: str | None = None,
     progress: Progress = silent,
 ) -> ManyPrepared:
@@ -89,14 +96,17 @@ def prepare_many(
         workers: Do the work.
         held_out: Likewise.
         split: Likewise.
+        declared: Likewise.
         by: What names the machine of a log, as for :func:`~casysid.identification.many.logs.open_logs`.
         progress: Likewise.
     """
     progress("open", 0.0)
     files = find_logs(logs)
-    opened = open_logs(robot, files, workers, by=by, split=split)
+    opened = open_logs(robot, files, workers, by=by, split=split, declared=declared)
     rest = [one.held_out for one in opened if one.held_out is not None]
-    unseen = [one.fitted for one in open_logs(robot, find_logs(held_out), workers)] if held_out else []
+    unseen = (
+        [one.fitted for one in open_logs(robot, find_logs(held_out), workers, declared=declared)] if held_out else []
+    )
     progress("open", 1.0)
     preparation = prepare(
         robot, [one.fitted for one in opened], settings, held_out=[*rest, *unseen], progress=progress, mapped=workers

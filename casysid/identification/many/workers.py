@@ -92,6 +92,17 @@ class Workers:
 
 
 @contextmanager
+def _environment_kept() -> Iterator[None]:
+    """What Dask sets in this process's environment for its workers, such as their number of threads, is taken back."""
+    before = dict(os.environ)
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+
+
+@contextmanager
 def open_workers(scheduler: str | None = None, workers: int | None = None) -> Iterator[Workers]:
     """Workers for as long as the context lasts.
 
@@ -122,6 +133,7 @@ def open_workers(scheduler: str | None = None, workers: int | None = None) -> It
         return
     if scheduler in (None, LOCAL):
         with (
+            _environment_kept(),
             LocalCluster(
                 n_workers=count, threads_per_worker=1, dashboard_address=":0", silence_logs=logging.CRITICAL
             ) as cluster,
