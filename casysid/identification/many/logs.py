@@ -59,7 +59,7 @@ def find_logs(logs: Logs) -> tuple[Path, ...]:
                 if file.is_file() and file.name[0] not in "._" and suffix_of(file) in SUFFIXES
             ]
             if not inside:
-                raise RecordingError(f"{path}: no log in this folder; wanted files of {', '.join(READ)}")
+                raise RecordingError(f"{path}: no log in this folder; wanted files of {', '.join(SUFFIXES)}")
             found += sorted(inside)
         elif not path.exists() and glob.has_magic(str(one)):
             matching = sorted(map(Path, glob.glob(str(one), recursive=True)))
