@@ -26,6 +26,7 @@ def info(
 
         from casysid.cli.console import printable, rich_table
         from casysid.recording import open_recording
+        from casysid.recording.held_joints import warn_of_held_joints
         from casysid.report.overview import recording_tables, robot_tables
 
         model = load_robot(robot, gravity, lock, floating_base)
@@ -35,6 +36,7 @@ def info(
         tables = robot_tables(model)
         if log is not None:
             tables += recording_tables(model, open_recording(log, model))
+            warn_of_held_joints([log], model)
         for title, table in tables:
             console.print(rich_table(title, table.header, table.rows))
             console.print()
