@@ -36,8 +36,10 @@ def folder(tmp_path_factory):
     """A small arm's file, two logs of it, and the virtual environment where ``make`` leaves it."""
     place = tmp_path_factory.mktemp("readme")
     shutil.copy(find_model("two_link.urdf"), place / "arm.urdf")
+    (place / "logs").mkdir()
     for seed, name in enumerate(("log.csv", "other.csv")):
-        simulated_run("two_link.urdf", seed, PlantSettings(), 4.0).recording.write(place / name)
+        log = simulated_run("two_link.urdf", seed, PlantSettings(), 4.0).recording.write(place / name)
+        shutil.copy(log, place / "logs")
     if (Path(sys.prefix) / "bin" / "activate").is_file():
         (place / ".venv").symlink_to(sys.prefix)
     return place
@@ -68,5 +70,5 @@ def test_the_shell_finds_and_runs_every_command(folder):
     if not (folder / ".venv").exists():
         pytest.skip("these tests run outside a virtual environment, so there is none to activate")
     run(["bash", "-euc", "\n".join(SHELL)], folder)
-    for name in ("rehearsed", "excite", "run", "identified", "excitation", "validated"):
+    for name in ("rehearsed", "excite", "run", "fleet", "identified", "excitation", "validated"):
         assert any((folder / name).iterdir())

@@ -119,7 +119,7 @@ def excite(
             rate=rate,
             limits=limits,
             clearance=clearance,
-            obstacles=_obstacles(floor, wall or [], box or []),
+            obstacles=obstacles_of(floor, wall or [], box or []),
             keep_in=_keep_in(model, keep_in or []),
             start=None if start is None else numbers("--start", start, model.nv),
         )
@@ -154,7 +154,8 @@ def _series(limits: JointLimits, rate: float, period: float | None, harmonics: i
     )
 
 
-def _obstacles(floor: float | None, walls: list[str], boxes: list[str]) -> list[HalfSpace | Box]:
+def obstacles_of(floor: float | None, walls: list[str], boxes: list[str]) -> list[HalfSpace | Box]:
+    """What stands around the robot, from the command line's words."""
     import numpy as np
 
     from casysid.excitation import Box, HalfSpace

@@ -34,6 +34,23 @@ class FrictionWord(enum.StrEnum):
 
 RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="URDF or MJCF file, or a bundled model's name.")]
 LogsArgument = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings: CSV, CSV.gz, Parquet or NPZ.")]
+FoldersArgument = Annotated[
+    list[Path], typer.Argument(metavar="LOG...", help="Recordings, or folders of them: CSV, CSV.gz, Parquet or NPZ.")
+]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="local|ADDRESS",
+        help="Spread many recordings over processes here, or over a Dask cluster; for a folder of logs: local.",
+    ),
+]
+ByOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="COLUMN|recording",
+        help="One model for each machine, named by a column that is constant in each log, or for each recording.",
+    ),
+]
 HeldOutOption = Annotated[
     list[Path] | None,
     typer.Option("--held-out", metavar="LOG", help="A recording to predict, never fitted. Repeatable."),

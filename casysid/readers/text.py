@@ -106,6 +106,10 @@ class TextTable:
             line, _ = next(islice(self._rows(lines), row, None), (self.header_line + 1 + row, []))
         return f"line {line} (the header is line {self.header_line})"
 
+    def rows(self, lines: TextIO) -> Iterator[list[str]]:
+        """Cells of every row that is not blank, of the file's text from its start on."""
+        return (cells for _, cells in self._rows(lines))
+
     def _rows(self, lines: TextIO) -> Iterator[tuple[int, list[str]]]:
         """Line number and cells of every row that is not blank."""
         for _ in range(self.header_line):
