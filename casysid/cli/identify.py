@@ -38,9 +38,11 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from casysid.identification import IdentificationResult
+    from casysid.identification.verdict import Word
 
 
 FILES = ("result.json", "identified.urdf", "identified.xml", "moments.npz", "report.html")
+STYLES = {"accepted": "bold green", "doubtful": "bold yellow", "rejected": "bold red"}
 SMALLEST_RUN = 2**15
 """Less than any run takes: that of two joints, without a choice of the low-pass, takes 108 kB [bytes]."""
 
@@ -71,7 +73,11 @@ def identify(
         "identified"
     ),
 ) -> None:
-    """Identify the inertial and friction parameters of ROBOT from recordings."""
+    """Identify the inertial and friction parameters of ROBOT from recordings.
+
+    Exit codes: 0 accepted, 3 doubtful (usable for some purposes; reasons are told), 4 rejected; 1 the solver failed,
+    2 bad input.
+    """
     from casysid.cli.console import SOLVER_FAILED, progress_bar, speaking, tell_path
 
     with speaking() as console:
@@ -92,13 +98,12 @@ def identify(
             with console.run_folder(out, identity_of(result), claims=FILES) as stage:
                 notes = add_result(result, stage, export_inconsistent=export_inconsistent)
                 add_report(result, stage)
-        _print(console, result, notes)
+        word = _print(console, result, notes)
         tell_path(out / "result.json")
-    if result.status is not Status.CONVERGED:
-        sys.exit(SOLVER_FAILED)
+    sys.exit(word.exit_code if result.status is Status.CONVERGED else SOLVER_FAILED)
 
 
-def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> None:
+def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> Word:
     from casysid.cli.console import rich_table, say
     from casysid.identification.verdict import judge
     from casysid.report import drive_table, error_table, link_table, noise_table
@@ -115,7 +120,8 @@ def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...
         console.print(rich_table("Noise of the measured motion", noise.header, noise.rows))
         console.print()
     verdict = judge(result)
-    say(console, verdict.headline, style="bold green" if verdict.accepted else "bold red")
+    say(console, verdict.headline, style=STYLES[verdict.headline])
     friction = [one.sentence for one in result.friction.chosen]
     for line in (*verdict.reasons, *verdict.remarks, *friction, *notes):
         say(console, f"  · {line}")
+    return verdict.word

@@ -22,6 +22,7 @@ from casysid.identification.noise_moments import with_noise
 from casysid.identification.passes import Passes, excerpts, is_long
 from casysid.identification.prediction import torque_errors
 from casysid.identification.result import IdentificationResult
+from casysid.identification.sameness import check_sameness
 from casysid.identification.settings import Settings
 from casysid.identification.tuning.band import BandChoice, choose_band
 from casysid.identification.tuning.candidates import Candidates, final_regressor, gather_candidates, moments_of
@@ -135,6 +136,7 @@ def prepare(
             several, cutoff=settings.cutoff, time_scale=settings.time_scale, delay=settings.delay, fewest=fewest
         )
     check_noise(fitted, settings.input_noise)
+    check_sameness(fitted, held_out)
     clock = _Clock()
     fitted, held_out = (tuple(one.flipped(settings.flip) for one in several) for several in (fitted, held_out))
     progress("tuning", 0.0)

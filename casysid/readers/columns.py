@@ -1,6 +1,6 @@
 """Which column of a log is which channel of the robot.
 
-A file names its columns by joint (``q_elbow, tau_elbow``) or numbers them in the model's order, from 1 or from 0
+A file names its columns by joint (``q_elbow, tau_elbow``) or numbers them in the model file's order, from 1 or from 0
 (``q1, dq1, ddq1, tau1``; ``q_1`` too, and plain ``q`` for a single one), never both. Of the spellings below the first
 that the file has counts, and the others are left aside.
 
@@ -92,20 +92,29 @@ class Layout:
         )
 
 
-def match_columns(found: Sequence[str], channels: Sequence[str], dofs: Sequence[str], source: str) -> Layout:
+def match_columns(
+    found: Sequence[str],
+    channels: Sequence[str],
+    dofs: Sequence[str],
+    source: str,
+    numbered: tuple[Sequence[str], Sequence[str]] | None = None,
+) -> Layout:
     """The layout of a file with the columns ``found``, for a robot with these channels and degrees of freedom.
+
+    ``numbered`` has the same channels and degrees of freedom in the order that numbers count; None is theirs.
 
     Raises:
         RecordingError: If a wanted column is missing, there twice or once too often, or names and numbers are mixed.
     """
+    counted = _Counted(channels, dofs, *(numbered or (channels, dofs)))
     named = _by_name(POSITION, found, channels, source)
-    position = named or _by_number(POSITION, found, channels, source)
+    position = named or counted.channels(POSITION, found, source)
     if position is None:
         raise _lacking(POSITION, [f"q_{name}" for name in channels], found, source)
     if named and all(f"q{k + 1}" in set(found) - set(named) for k in range(len(channels))):
         raise _mixed(source, named[0], "q1")
     optional = (VELOCITY, ACCELERATION)
-    find, other = (_by_name, _by_number) if named else (_by_number, _by_name)
+    find, other = (_by_name, counted.dofs) if named else (counted.dofs, _by_name)
     velocity, acceleration, torque = (find(quantity, found, dofs, source) for quantity in (*optional, TORQUE))
     for quantity, columns in zip((*optional, TORQUE), (velocity, acceleration, torque), strict=True):
         stray = None if columns else other(quantity.usual if quantity in optional else quantity, found, dofs, source)
@@ -118,6 +127,33 @@ def match_columns(found: Sequence[str], channels: Sequence[str], dofs: Sequence[
     layout = Layout(time=time, position=position, velocity=velocity, acceleration=acceleration, torque=torque)
     _refuse_unusable(layout, found, source)
     return layout
+
+
+@dataclass(frozen=True)
+class _Counted:
+    """Numbered columns, put from the order in which numbers count into the robot's."""
+
+    own_channels: Sequence[str]
+    own_dofs: Sequence[str]
+    counted_channels: Sequence[str]
+    counted_dofs: Sequence[str]
+
+    def channels(self, quantity: Quantity, found: Sequence[str], source: str) -> tuple[str, ...] | None:
+        """Columns by channel."""
+        columns = _by_number(quantity, found, self.counted_channels, source)
+        return columns and self._in_own_order(columns, self.counted_channels, self.own_channels)
+
+    def dofs(
+        self, quantity: Quantity, found: Sequence[str], names: Sequence[str], source: str
+    ) -> tuple[str, ...] | None:
+        """Columns by degree of freedom."""
+        columns = _by_number(quantity, found, self.counted_dofs, source)
+        return columns and self._in_own_order(columns, self.counted_dofs, names)
+
+    @staticmethod
+    def _in_own_order(columns: tuple[str, ...], counted: Sequence[str], own: Sequence[str]) -> tuple[str, ...]:
+        place = {name: k for k, name in enumerate(counted)}
+        return tuple(columns[place[name]] for name in own)
 
 
 def _by_name(quantity: Quantity, found: Sequence[str], names: Sequence[str], source: str) -> tuple[str, ...] | None:
@@ -162,7 +198,7 @@ def _in_order(quantity: Quantity, hits: dict[int, str], names: Sequence[str], so
     raise RecordingError(
         f"{source}: {len(columns)} numbered columns of {quantity.word} ({listing(columns, 8)}), "
         f"but the robot has {len(names)}: {listing(names)}. Numbers run from 1 in the "
-        f"model's order, none left out{transposed}; "
+        f"model file's order, none left out{transposed}; "
         f"name the columns by joint ({quantity.named[0]}_{names[0]}) or lock the joints that the log lacks"
     )
 

@@ -39,7 +39,7 @@ def load_recording(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]
 
 def _load(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]]:
     table = open_table(path)
-    layout = match_columns(table.names, robot.channels, robot.dofs, str(path))
+    layout = match_columns(table.names, robot.channels, robot.dofs, str(path), robot.numbered)
     parts: list[dict[str, Array]] = []
 
     def kept() -> Iterator[dict[str, Array]]:
@@ -63,7 +63,7 @@ def scan_recording(path: Path, robot: Robot) -> tuple[RecordingFile, tuple[str, 
         RecordingError: If it cannot be used.
     """
     table = open_table(path)
-    layout = match_columns(table.names, robot.channels, robot.dofs, str(path))
+    layout = match_columns(table.names, robot.channels, robot.dofs, str(path), robot.numbered)
     version = _version(path)
     statistics = _scan(table, layout, robot, str(path), table.batches(layout.used))
     facts = statistics.facts()
