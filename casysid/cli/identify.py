@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from casysid.cli.gravity import in_its_gravity, is_auto
 from casysid.cli.options import (
     AccelerationNoiseOption,
     ConsistencyChoice,
@@ -78,7 +79,7 @@ def identify(
     Exit codes: 0 accepted, 3 doubtful (usable for some purposes; reasons are told), 4 rejected; 1 the solver failed,
     2 bad input.
     """
-    from casysid.cli.console import SOLVER_FAILED, progress_bar, speaking, tell_path
+    from casysid.cli.console import SOLVER_FAILED, progress_bar, say, speaking, tell_path
 
     with speaking() as console:
         from casysid.estimation import Status
@@ -90,8 +91,11 @@ def identify(
         check_run_folder(out, FILES, SMALLEST_RUN)
         noise = noise_levels(noise_position, noise_velocity, noise_acceleration)
         settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise, friction, flip)
-        model = load_robot(robot, gravity, lock, floating_base)
+        model = load_robot(robot, None if is_auto(gravity) else gravity, lock, floating_base)
         fitted, unseen = load_recordings(model, logs, held_out, split)
+        if is_auto(gravity):
+            model, found = in_its_gravity(model, fitted)
+            say(console, found)
         with progress_bar(console) as progress:
             result = run(model, fitted, settings, held_out=unseen, progress=progress)
             progress("write", 0.0)

@@ -60,6 +60,12 @@ def find_mistakes(robot: Robot, motions: Sequence[Motion], cutoff: float | None)
     return (*found, *search.wrong_scales())
 
 
+@single_threaded()
+def find_gravity(robot: Robot, motions: Sequence[Motion], cutoff: float | None) -> Mistake | None:
+    """The gravity that motions and their torques ask for, if it clearly is not the file's."""
+    return next((mistake for mistake in find_mistakes(robot, motions, cutoff) if mistake.gravity), None)
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Reading:
     """The log read as if a mistake had been made; ``gravity`` None is the file's."""
