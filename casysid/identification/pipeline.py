@@ -15,6 +15,7 @@ from casysid.dynamics import Regressor
 from casysid.errors import CasysidWarning, RecordingError
 from casysid.estimation import Estimate
 from casysid.identifiability import BaseParameters, excited_base_parameters, structural_base_parameters
+from casysid.identification.aside import gains_of_the_rest
 from casysid.identification.choices import Choices
 from casysid.identification.friction_laws import friction_laws
 from casysid.identification.mistakes import find_mistakes
@@ -28,7 +29,6 @@ from casysid.identification.tuning.band import BandChoice, choose_band
 from casysid.identification.tuning.candidates import Candidates, final_regressor, gather_candidates, moments_of
 from casysid.identification.tuning.clock import choose_clock
 from casysid.identification.tuning.delay import choose_delay
-from casysid.identification.tuning.drive_gains import choose_drive_gains
 from casysid.identification.tuning.friction_selection import FrictionChoice, select_friction
 from casysid.moments import Moments
 from casysid.projection import ProjectionProblem, ProjectionResult, build_projection, possible_parameters, project
@@ -288,9 +288,7 @@ def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, prog
     friction = select_friction(candidates, settings) if candidates.proposals else FrictionChoice(settings)
     regressor = final_regressor(candidates, settings, [proposal for proposal, _ in friction.taken])
     moments = moments_of(regressor, candidates, friction.taken)
-    gains = choose_drive_gains(
-        moments, regressor.parameters, settings.consistency, settings.knowledge, settings.torque_gains
-    )
+    gains = gains_of_the_rest(moments, regressor, settings)
     if gains.found:
         warnings.warn(gains.reason, CasysidWarning, stacklevel=4)
         settings = dataclasses.replace(settings, torque_gains=tuple(gains.values.tolist()))

@@ -14,22 +14,15 @@ from functools import cached_property
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.errors import SolverError
-from casysid.estimation import Ridge
-from casysid.estimation.cross_validation import contiguous_folds
+from casysid.identification.aside import SILENT, UNEXPLAINED, missed_on_blocks
 from casysid.identification.prediction import TorqueError
 from casysid.identification.result import IdentificationResult
-from casysid.identification.verdict.criteria import Criterion, Word, names
-from casysid.moments import Moments
+from casysid.identification.verdict.criteria import Criterion, Word
 
 WHOLE, WHOLE_AT_ALL = 0.2, 0.5
 """Share of all joints' torque that may be missed: accepted, and not rejected."""
-JOINT, JOINT_AT_ALL = 0.4, 0.75
-"""Share of one joint's varying torque likewise."""
-SILENT = 1e-6
-"""Share of its own size that torque varies by which was not measured."""
-FOLDS = 5
-"""Of cross-validation where nothing is held out."""
+JOINT = 0.4
+"""Share of one joint's varying torque that may be missed."""
 FELT = "computed torque leaves the missed share of the torque, and of the error of feedback alone, to feedback"
 
 
@@ -55,7 +48,11 @@ class Unexplained:
         Without held-out data no less than in cross-validation over blocks of time.
         """
         missed = _missed(self.judge)
-        return missed if self.result.held_out else np.fmax(missed, cross_validated(self.result.moments, self.result))
+        return (
+            missed
+            if self.result.held_out
+            else np.fmax(missed, missed_on_blocks(self.result.moments, self.result.regressor))
+        )
 
     @cached_property
     def silent(self) -> tuple[str, ...]:
@@ -67,7 +64,7 @@ class Unexplained:
         """Joints that nothing explains."""
         dofs = self.result.robot.dofs
         return tuple(
-            dof for dof, share in zip(dofs, self.by_joint, strict=True) if np.isnan(share) or share > JOINT_AT_ALL
+            dof for dof, share in zip(dofs, self.by_joint, strict=True) if np.isnan(share) or share > UNEXPLAINED
         )
 
     @cached_property
@@ -123,7 +120,7 @@ def _each_joint(unexplained: Unexplained) -> Iterator[Criterion]:
             name="torque missed",
             joint=dof,
             value=float("inf") if silent else float(share),
-            limit=JOINT_AT_ALL if lost else JOINT,
+            limit=UNEXPLAINED if lost else JOINT,
             word=Word.REJECTED if lost and not rest else Word.DOUBTFUL,
             reason=f"{found}{'?' if lost else ''}{beside if lost else ''}{'' if lost and not rest else '.'}",
             origin=FELT,
@@ -136,37 +133,3 @@ def _missed(error: TorqueError) -> Array:
     size = np.maximum(np.linalg.norm(measured, axis=0), 1e-300)
     missed = np.linalg.norm(measured - predicted, axis=0) / np.maximum(varying, 1e-300)
     return np.asarray(np.where(varying > SILENT * size, missed, np.nan))
-
-
-def cross_validated(moments: Moments, result: IdentificationResult) -> Array:
-    """What blocks of time predicted from the others miss of each joint's varying torque, shape (nv,)."""
-    moving = moments.away_from_rest()
-    folds, prior = contiguous_folds(moving.blocks, FOLDS), result.regressor.prior
-    missed = np.zeros(len(moving.joints))
-    for fold in folds:
-        training = moving.select_blocks(np.setdiff1d(np.arange(moving.blocks), fold))
-        try:
-            found = Ridge(standard_errors=False).estimate(training, prior).parameters
-        except SolverError:
-            return np.full(len(missed), np.inf)
-        missed += moving.select_blocks(fold).residual_energy(found).sum(axis=0)
-    return np.sqrt(missed / np.maximum(_varying_energy(moving, result), 1e-300))
-
-
-def _varying_energy(moments: Moments, result: IdentificationResult) -> Array:
-    """Of each joint's torque about its mean, shape (joints,); about zero where the model has no offset."""
-    energy, count = moments.target_energy().sum(axis=0), moments.count.sum(axis=0)
-    offsets = {one.owner: k for k, one in enumerate(result.regressor.parameters) if one.kind == "offset"}
-    for joint, dof in enumerate(moments.joints):
-        own, squares = moments.of_joint(joint)
-        place = np.flatnonzero(own == offsets.get(dof, -1))
-        if len(place) and count[joint]:
-            column = squares.sum(axis=0)[place[0]]
-            if column[place[0]] > 0.0:
-                energy[joint] -= column[-1] ** 2 / column[place[0]]
-    return np.maximum(energy, 0.0)
-
-
-def named(unexplained: Unexplained) -> str:
-    """Joints that are set aside."""
-    return names(unexplained.set_aside)
