@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from casysid.cli.gravity import in_its_gravity, is_auto
 from casysid.cli.log_options import (
     ConstantOption,
     EfficiencyOption,
@@ -44,6 +45,7 @@ from casysid.cli.options import (
     noise_levels,
 )
 from casysid.cli.ranges import check_options
+from casysid.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -52,6 +54,7 @@ if TYPE_CHECKING:
 
     from casysid.identification import IdentificationResult, Settings
     from casysid.identification.many import Fleet
+    from casysid.identification.verdict import Word
     from casysid.recording import Declared
     from casysid.robot import Robot
 
@@ -61,6 +64,7 @@ FILES = (
     *("model.json", "model.npz", "moments.npz", "report.html"),
     *("fleet.json", "fleet.csv"),
 )
+STYLES = {"accepted": "bold green", "doubtful": "bold yellow", "rejected": "bold red"}
 SMALLEST_RUN = 2**15
 """Less than any run takes: that of two joints, without a choice of the low-pass, takes 108 kB [bytes]."""
 
@@ -98,8 +102,12 @@ def identify(
         "identified"
     ),
 ) -> None:
-    """Identify the inertial and friction parameters of ROBOT from recordings."""
-    from casysid.cli.console import SOLVER_FAILED, progress_bar, rich_table, speaking, tell_path
+    """Identify the inertial and friction parameters of ROBOT from recordings.
+
+    Exit codes: 0 accepted, 3 doubtful (usable for some purposes; reasons are told), 4 rejected; 1 the solver failed,
+    2 bad input.
+    """
+    from casysid.cli.console import SOLVER_FAILED, progress_bar, rich_table, say, speaking, tell_path
 
     with speaking() as console:
         from casysid.estimation import Status
@@ -114,10 +122,17 @@ def identify(
         noise = noise_levels(noise_position, noise_velocity, noise_acceleration)
         settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise, friction, flip)
         said = declared_of(units, columns, motor_constant, gear, efficiency)
-        model = load_robot(robot, gravity, lock, floating_base)
+        model = load_robot(robot, None if is_auto(gravity) else gravity, lock, floating_base)
         many = scheduler is not None or by is not None or any(map(holds_logs, logs))
         fitted, unseen = ([], []) if many else load_recordings(model, logs, held_out, split, said)
         fleet = None
+        if is_auto(gravity):
+            if many:
+                raise ParameterError(
+                    "--gravity auto looks at logs named one by one; give the vector for folders of them"
+                )
+            model, found = in_its_gravity(model, fitted)
+            say(console, found)
         with progress_bar(console) as progress:
             if many:
                 result, fleet = _run_many(model, logs, settings, held_out, split, said, scheduler, by, progress)
@@ -129,12 +144,11 @@ def identify(
                 add_report(result, stage)
                 if fleet is not None:
                     add_fleet(fleet, stage)
-        _print(console, result, notes)
+        word = _print(console, result, notes)
         if fleet is not None:
             console.print(rich_table("Differences between machines", *fleet_rows(fleet)))
         tell_path(out / "result.json")
-    if result.status is not Status.CONVERGED:
-        sys.exit(SOLVER_FAILED)
+    sys.exit(word.exit_code if result.status is Status.CONVERGED else SOLVER_FAILED)
 
 
 def _run_many(
@@ -161,7 +175,7 @@ def _run_many(
     return fleet.pooled, fleet
 
 
-def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> None:
+def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> Word:
     from casysid.cli.console import rich_table, say
     from casysid.identification.verdict import judge
     from casysid.report import drive_table, error_table, link_table, noise_table
@@ -178,7 +192,8 @@ def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...
         console.print(rich_table("Noise of the measured motion", noise.header, noise.rows))
         console.print()
     verdict = judge(result)
-    say(console, verdict.headline, style="bold green" if verdict.accepted else "bold red")
+    say(console, verdict.headline, style=STYLES[verdict.headline])
     friction = [one.sentence for one in result.friction.chosen]
     for line in (*verdict.reasons, *verdict.remarks, *friction, *notes):
         say(console, f"  · {line}")
+    return verdict.word

@@ -109,7 +109,11 @@ FrictionOption = Annotated[
 ]
 GravityOption = Annotated[
     tuple[float, float, float] | None,
-    typer.Option("--gravity", metavar="X Y Z", help="Gravity in the base frame [m/s²]; default: the model's."),
+    typer.Option(
+        "--gravity",
+        metavar="X Y Z",
+        help="Gravity in the base frame [m/s²]; default: the model's. identify takes auto too: what the log asks for.",
+    ),
 ]
 LockOption = Annotated[
     list[str] | None, typer.Option("--lock", metavar="JOINT=VALUE", help="Hold a joint fixed [rad or m]. Repeatable.")

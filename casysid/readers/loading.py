@@ -176,7 +176,9 @@ def _scan(path: Path, robot: Robot, declared: Declared, parts: list[Columns] | N
     table, source = open_table(path), str(path)
     if table.nameless and not declared.columns:
         raise RecordingError(table.nameless)
-    layout = lay_out(table.names, robot.channels, robot.dofs, source, table.labels, declared, _lengths(robot))
+    layout = lay_out(
+        table.names, robot.channels, robot.dofs, source, table.labels, declared, _lengths(robot), robot.numbered
+    )
     samples = Samples(table, layout).with_clock_started()
     samples.check_curves(source)
     remarks = list(layout.remarks)

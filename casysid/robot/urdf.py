@@ -66,6 +66,7 @@ def read_urdf(
         faults=faults,
         floating_base=adds_joint,
         locked=held,
+        file_order=tuple(joints),
     )
     moving = {joint.name for joint in robot.joints}
     warn_of_doubts(path, [joint for joint in joints.values() if joint.name in moving], stacklevel=stacklevel)
