@@ -44,6 +44,7 @@ class Dialect:
         digits: To which the numbers are read back (absolute); 0 for all bits.
         declared: What its user has to say.
         warns: What is said of it; empty for nothing.
+        lost: Rows at the start that are left out.
     """
 
     suffix: str
@@ -51,6 +52,7 @@ class Dialect:
     digits: float = 0.0
     declared: Declared = field(default_factory=Declared)
     warns: str = ""
+    lost: int = 0
 
 
 Cells = list[list[str]]
@@ -311,7 +313,7 @@ DIALECTS: dict[str, Dialect] = {
     "semicolons": dressed(lambda log: usual(log, ";")),
     "decimal commas": dressed(lambda log: with_commas(log, ";")),
     "decimal commas and tabs": dressed(lambda log: with_commas(log, "\t"), suffix=".txt"),
-    "decimal commas late": dressed(lambda log: with_commas(log, ";", zeros=1), digits=np.inf),
+    "a first row of zeros": dressed(lambda log: with_commas(log, ";", zeros=1), lost=1, warns="1 single samples"),
     "trailing commas": dressed(lambda log: usual(log).replace("\n", ",\n").replace(",\n", "\n", 1)),
     "trailing commas in the header too": dressed(lambda log: usual(log).replace("\n", ",\n")),
     "carriage returns and a mark": dressed(lambda log: usual(log, end="\r\n"), encoding="utf-8-sig"),
