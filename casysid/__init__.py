@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from casysid.inertia import Consistency as Consistency
     from casysid.model import RobotModel as RobotModel
     from casysid.moments import Moments as Moments
+    from casysid.payload import identify_payload as identify_payload
     from casysid.recording import Recording as Recording
     from casysid.recording import open_recording as open_recording
     from casysid.recording import open_recordings as open_recordings
@@ -71,6 +72,7 @@ _HOMES = {
     "find_model": "casysid.bundled",
     "generate_c": "casysid.dynamics",
     "identify": "casysid.identification",
+    "identify_payload": "casysid.payload",
     "open_recording": "casysid.recording",
     "open_recordings": "casysid.recording",
     "prepare": "casysid.identification",

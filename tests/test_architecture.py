@@ -23,6 +23,7 @@ ORDER = (
     ("uncertainty", "simulation"),
     ("model",),
     ("identification",),
+    ("payload",),
     ("validation",),
     ("report",),
     ("cli",),

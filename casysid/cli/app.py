@@ -12,6 +12,7 @@ from casysid.cli.compare import compare
 from casysid.cli.excite import excite
 from casysid.cli.identify import identify
 from casysid.cli.info import info
+from casysid.cli.payload import payload
 from casysid.cli.rehearse import rehearse
 from casysid.cli.validate import validate
 
@@ -55,6 +56,10 @@ app.command(epilog="Example: casysid compare arm.urdf excite.csv --split 0.6 --m
 app.command(
     epilog="Examples: casysid excite arm.urdf --out excite  ·  casysid excite head --out next --log earlier.csv"
 )(excite)
+app.command(
+    epilog="Examples: casysid payload arm.urdf --without empty.csv --with gripper.csv  ·  "
+    "casysid payload arm.urdf --without empty.csv --with box=a.csv --with tool=b.csv --mass tool=1.2"
+)(payload)
 app.command(epilog="Examples: casysid rehearse head  ·  casysid rehearse arm.urdf --duration 20 --out rehearsal")(
     rehearse
 )
