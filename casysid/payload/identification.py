@@ -11,13 +11,14 @@ parameters, without the need to repeat the same motion.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from casysid.arrays import Array
-from casysid.dynamics import Offset, Regressor
+from casysid.dynamics import Offset, Regressor, Spring
 from casysid.errors import ParameterError, RecordingError
 from casysid.estimation.covariance import RANK_TOLERANCE
 from casysid.estimation.evidence import VARIANCE_FLOOR
@@ -31,7 +32,7 @@ from casysid.payload.columns import Loading, joint_moments
 from casysid.payload.frames import holding_frame
 from casysid.payload.results import PayloadResult
 from casysid.recording import Source
-from casysid.robot import Robot
+from casysid.robot import JointKind, Robot
 from casysid.signals.admission import check_recordings
 from casysid.threads import single_threaded
 
@@ -77,7 +78,7 @@ def identify_payload(
     frame = holding_frame(robot, link)
     groups = _by_name(with_payload)
     masses = _masses(known_mass, groups)
-    settings = settings or Settings()
+    settings = _with_springs(robot, settings or Settings())
     empty = (without,) if isinstance(without, Source) else tuple(without)
     every = [one for group in groups.values() for one in group]
     prepared = prepare(robot, empty or every, settings, progress=progress)
@@ -113,6 +114,17 @@ def identify_payload(
     progress("payload", 1.0)
     reference = f"{len(empty)} recordings without payload" if empty else f"the file {robot.source.name}"
     return PayloadResult(robot.name, frame.name, tuple(payloads), reference)
+
+
+def _with_springs(robot: Robot, settings: Settings) -> Settings:
+    """Springs at every joint that has a position: hoses and cables pull with and without a payload alike.
+
+    Without a column for them their pull would be taken for a change of weight wherever two motions dwell elsewhere.
+    """
+    if any(kind.kind == Spring.kind for kind in settings.friction):
+        return settings
+    joints = tuple(joint.name for joint in robot.joints if joint.kind in (JointKind.REVOLUTE, JointKind.PRISMATIC))
+    return dataclasses.replace(settings, friction=(*settings.friction, Spring(joints)))
 
 
 def _by_name(given: Recordings | Mapping[str, Recordings]) -> dict[str, tuple[Source, ...]]:
