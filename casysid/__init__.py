@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from casysid.excitation import build_excitation as build_excitation
     from casysid.excitation import design_excitation as design_excitation
     from casysid.excitation import write_excitation as write_excitation
+    from casysid.experiment import read_experiment as read_experiment
+    from casysid.experiment import run_experiment as run_experiment
     from casysid.identification import IdentificationResult as IdentificationResult
     from casysid.identification import Settings as Settings
     from casysid.identification import compare as compare
@@ -76,10 +78,12 @@ _HOMES = {
     "open_recording": "casysid.recording",
     "open_recordings": "casysid.recording",
     "prepare": "casysid.identification",
+    "read_experiment": "casysid.experiment",
     "read_recording": "casysid.recording",
     "read_recordings": "casysid.recording",
     "read_result": "casysid.identification.saved",
     "rehearse": "casysid.validation",
+    "run_experiment": "casysid.experiment",
     "simulate": "casysid.simulation",
     "write_excitation": "casysid.excitation",
     "write_report": "casysid.report",

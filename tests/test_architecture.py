@@ -26,6 +26,7 @@ ORDER = (
     ("payload",),
     ("validation",),
     ("report",),
+    ("experiment",),
     ("cli",),
 )
 LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}

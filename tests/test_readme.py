@@ -28,16 +28,19 @@ def words(code):
 
 
 SHELL = [line for language, code in BLOCKS if language == "sh" for line in words(code) if line not in NOT_RUN]
+EXPERIMENTS = [code for language, code in BLOCKS if language == "toml"]
 PYTHON = [code for language, code in BLOCKS if language == "python"]
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A small arm's file, two logs of it, and the virtual environment where ``make`` leaves it."""
+    """A small arm's file, two logs of it, an experiment, and the virtual environment where ``make`` leaves it."""
     place = tmp_path_factory.mktemp("readme")
     shutil.copy(find_model("two_link.urdf"), place / "arm.urdf")
     for seed, name in enumerate(("log.csv", "other.csv")):
         simulated_run("two_link.urdf", seed, PlantSettings(), 4.0).recording.write(place / name)
+    (experiment,) = EXPERIMENTS
+    (place / "experiment.toml").write_text(experiment, encoding="utf-8")
     if (Path(sys.prefix) / "bin" / "activate").is_file():
         (place / ".venv").symlink_to(sys.prefix)
     return place
@@ -50,7 +53,7 @@ def run(command, folder):
 
 
 def test_every_block_says_what_it_is():
-    assert {language for language, _ in BLOCKS} == {"sh", "python", "text"}
+    assert {language for language, _ in BLOCKS} == {"sh", "python", "text", "toml"}
     every = [line for language, code in BLOCKS if language == "sh" for line in words(code)]
     assert NOT_RUN.keys() <= set(every)
     assert every[len(NOT_RUN)] == "source .venv/bin/activate"
@@ -68,5 +71,5 @@ def test_the_shell_finds_and_runs_every_command(folder):
     if not (folder / ".venv").exists():
         pytest.skip("these tests run outside a virtual environment, so there is none to activate")
     run(["bash", "-euc", "\n".join(SHELL)], folder)
-    for name in ("rehearsed", "excite", "run", "identified", "excitation", "validated"):
+    for name in ("rehearsed", "excite", "run", "identified", "excitation", "validated", "answers"):
         assert any((folder / name).iterdir())

@@ -51,6 +51,7 @@ NO_DOORS = {
     "parameter_within": "what is known, in words",
     "possible_parameters": "the function that it gives is a door",
     "read_earlier_result": "a file",
+    "read_experiment": "a file",
     "read_recording": "load_recording is its door",
     "read_recordings": "load_recording is its door",
     "read_result": "files",

@@ -14,6 +14,7 @@ from casysid.cli.identify import identify
 from casysid.cli.info import info
 from casysid.cli.payload import payload
 from casysid.cli.rehearse import rehearse
+from casysid.cli.run import run
 from casysid.cli.validate import validate
 
 app = typer.Typer(
@@ -63,6 +64,7 @@ app.command(
 app.command(epilog="Examples: casysid rehearse head  ·  casysid rehearse arm.urdf --duration 20 --out rehearsal")(
     rehearse
 )
+app.command(epilog="Example: casysid run experiment.toml  ·  casysid run run/experiment.toml --out again")(run)
 app.command(epilog="Example: casysid validate identified/identified.urdf other.csv")(validate)
 app.command(epilog="Examples: casysid info arm.urdf  ·  casysid info arm.urdf excite.csv.gz")(info)
 

@@ -95,13 +95,14 @@ def identify(
             with console.run_folder(out, identity_of(result), claims=FILES) as stage:
                 notes = add_result(result, stage, export_inconsistent=export_inconsistent)
                 add_report(result, stage)
-        _print(console, result, notes)
+        tell_result(console, result, notes)
         tell_path(out / "result.json")
     if result.status is not Status.CONVERGED:
         sys.exit(SOLVER_FAILED)
 
 
-def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> None:
+def tell_result(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> None:
+    """The tables, the verdict, and what else a person should know."""
     from casysid.cli.console import rich_table, say
     from casysid.identification.verdict import judge
     from casysid.report import drive_table, error_table, link_table, noise_table
