@@ -28,13 +28,19 @@ if TYPE_CHECKING:
     from casysid.identification import compare as compare
     from casysid.identification import identify as identify
     from casysid.identification import prepare as prepare
+    from casysid.identification.many import identify_fleet as identify_fleet
+    from casysid.identification.many import identify_many as identify_many
     from casysid.identification.output import write_result as write_result
     from casysid.identification.saved import SavedResult as SavedResult
     from casysid.identification.saved import read_result as read_result
     from casysid.inertia import Consistency as Consistency
+    from casysid.kinematics import Kinematics as Kinematics
     from casysid.model import RobotModel as RobotModel
     from casysid.moments import Moments as Moments
     from casysid.payload import identify_payload as identify_payload
+    from casysid.reaching import InverseKinematics as InverseKinematics
+    from casysid.reaching import LookAt as LookAt
+    from casysid.reaching import PoseTarget as PoseTarget
     from casysid.recording import Recording as Recording
     from casysid.recording import open_recording as open_recording
     from casysid.recording import open_recordings as open_recordings
@@ -56,9 +62,13 @@ _HOMES = {
     "Coupling": "casysid.dynamics",
     "ErrorsInVariables": "casysid.estimation",
     "IdentificationResult": "casysid.identification",
+    "InverseKinematics": "casysid.reaching",
+    "Kinematics": "casysid.kinematics",
+    "LookAt": "casysid.reaching",
     "Moments": "casysid.moments",
     "OrdinaryLeastSquares": "casysid.estimation",
     "Plant": "casysid.simulation",
+    "PoseTarget": "casysid.reaching",
     "Recording": "casysid.recording",
     "Ridge": "casysid.estimation",
     "Robot": "casysid.robot",
@@ -75,6 +85,8 @@ _HOMES = {
     "generate_c": "casysid.dynamics",
     "identify": "casysid.identification",
     "identify_payload": "casysid.payload",
+    "identify_fleet": "casysid.identification.many",
+    "identify_many": "casysid.identification.many",
     "open_recording": "casysid.recording",
     "open_recordings": "casysid.recording",
     "prepare": "casysid.identification",

@@ -43,10 +43,7 @@ from casysid.report import add_report, html, render_report, write_report
 from casysid.robot import Robot
 from casysid.simulation import PD, ComputedTorque, ControlModel, Plant, PlantSettings, design_sinusoids, simulate
 
-FILES = (
-    *("result.json", "identified.urdf", "drive.yaml", "model.json"),
-    *("model.npz", "moments.npz", "report.html"),
-)
+FILES = ("result.json", "identified.urdf", "drive.yaml", "model.json", "model.npz", "moments.npz", "report.html")
 FOREIGN = "notes.txt"
 COMMAND = ("--friction", "plain", "--method", "wls", "--cutoff", "12", "--delay", "0")
 Write = Callable[[Path], None]

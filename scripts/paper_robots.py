@@ -41,7 +41,7 @@ from casysid.identification import Settings, choose_band
 from casysid.identification.noise_moments import with_noise
 from casysid.identification.passes import Passes, sum_moments
 from casysid.moments import Moments
-from casysid.projection import build_projection, possible_parameters, project
+from casysid.projection import PossibleParameters, build_projection, project
 from casysid.recording import Recording
 from casysid.robot import Robot
 from casysid.signals import Motion, motion_from_recording, position_noise
@@ -347,7 +347,7 @@ def of_casysid(estimator: Estimator) -> Method:
 
     def fit(recorded: Recorded) -> Fitted:
         problem, prior = recorded.own, recorded.own.regressor.prior
-        possible = possible_parameters(build_projection(problem.regressor.parameters), prior)
+        possible = PossibleParameters(build_projection(problem.regressor.parameters), prior)
         estimate = estimator.estimate_among(problem.moments, prior, possible)
         return project_estimate(problem.regressor, problem.moments, estimate), f"cut-off {problem.cutoff:.3g} Hz"
 

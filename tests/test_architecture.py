@@ -17,9 +17,10 @@ ORDER = (
     ("nlp", "inertia"),
     ("robot", "bundled"),
     ("recording", "readers", "dynamics"),
-    ("signals", "moments", "moments_file", "accumulation"),
+    ("signals", "moments", "moments_file", "accumulation", "kinematics"),
     ("identifiability",),
     ("estimation", "projection", "excitation"),
+    ("reaching",),
     ("uncertainty", "simulation"),
     ("model",),
     ("identification",),
@@ -100,6 +101,8 @@ def test_choices_know_nothing_of_the_pipeline_that_asks_for_them():
         ("clarabel", {"projection"}),
         ("sklearn", {"estimation"}),
         ("pyarrow", {"readers"}),
+        ("dask", {"identification"}),
+        ("distributed", {"identification"}),
     ],
 )
 def test_heavy_packages_stay_in_their_rooms(package, rooms):

@@ -37,8 +37,10 @@ def folder(tmp_path_factory):
     """A small arm's file, two logs of it, an experiment, and the virtual environment where ``make`` leaves it."""
     place = tmp_path_factory.mktemp("readme")
     shutil.copy(find_model("two_link.urdf"), place / "arm.urdf")
+    (place / "logs").mkdir()
     for seed, name in enumerate(("log.csv", "other.csv")):
-        simulated_run("two_link.urdf", seed, PlantSettings(), 4.0).recording.write(place / name)
+        log = simulated_run("two_link.urdf", seed, PlantSettings(), 4.0).recording.write(place / name)
+        shutil.copy(log, place / "logs")
     (experiment,) = EXPERIMENTS
     (place / "experiment.toml").write_text(experiment, encoding="utf-8")
     if (Path(sys.prefix) / "bin" / "activate").is_file():
@@ -71,5 +73,5 @@ def test_the_shell_finds_and_runs_every_command(folder):
     if not (folder / ".venv").exists():
         pytest.skip("these tests run outside a virtual environment, so there is none to activate")
     run(["bash", "-euc", "\n".join(SHELL)], folder)
-    for name in ("rehearsed", "excite", "run", "identified", "excitation", "validated", "answers"):
+    for name in ("rehearsed", "excite", "run", "fleet", "identified", "excitation", "validated", "answers"):
         assert any((folder / name).iterdir())

@@ -49,7 +49,6 @@ NO_DOORS = {
     "open_recording": "scan_recording is its door",
     "open_recordings": "scan_recording is its door",
     "parameter_within": "what is known, in words",
-    "possible_parameters": "the function that it gives is a door",
     "read_earlier_result": "a file",
     "read_experiment": "a file",
     "read_recording": "load_recording is its door",

@@ -13,6 +13,8 @@ from casysid.cli.excite import excite
 from casysid.cli.identify import identify
 from casysid.cli.info import info
 from casysid.cli.payload import payload
+from casysid.cli.pose import pose
+from casysid.cli.reach import reach
 from casysid.cli.rehearse import rehearse
 from casysid.cli.run import run
 from casysid.cli.validate import validate
@@ -67,6 +69,14 @@ app.command(epilog="Examples: casysid rehearse head  ·  casysid rehearse arm.ur
 app.command(epilog="Example: casysid run experiment.toml  ·  casysid run run/experiment.toml --out again")(run)
 app.command(epilog="Example: casysid validate identified/identified.urdf other.csv")(validate)
 app.command(epilog="Examples: casysid info arm.urdf  ·  casysid info arm.urdf excite.csv.gz")(info)
+app.command(
+    context_settings={"ignore_unknown_options": True},  # negative positions look like options
+    epilog="Examples: casysid pose arm.urdf --frame tool 0.1 -0.5 0.3  ·  casysid pose arm.urdf elbow=-0.5",
+)(pose)
+app.command(
+    epilog="Examples: casysid reach arm.urdf --frame tool --at 0.4 0 0.3  ·  casysid reach arm.urdf --frame tool "
+    "--at 0.4 0 0.3 --rpy 0 1.57 0 --clearance 0.01 --floor 0"
+)(reach)
 
 
 def main() -> None:

@@ -7,6 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from casysid.cli.log_options import (
+    ConstantOption,
+    EfficiencyOption,
+    GearOption,
+    MapOption,
+    UnitsOption,
+    declared_of,
+)
 from casysid.cli.options import (
     ConsistencyChoice,
     ConsistencyOption,
@@ -47,6 +55,11 @@ def compare(
     delay: DelayOption = "auto",
     coupling: CouplingOption = None,
     friction: FrictionOption = FrictionWord.AUTO,
+    units: UnitsOption = None,
+    columns: MapOption = None,
+    motor_constant: ConstantOption = None,
+    gear: GearOption = None,
+    efficiency: EfficiencyOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
     floating_base: FloatingOption = False,
@@ -72,8 +85,9 @@ def compare(
         settings = make_settings(
             "empirical-bayes", consistency, cutoff, coupling, time_scale, delay, friction=friction, flip=flip
         )
+        said = declared_of(units, columns, motor_constant, gear, efficiency)
         model = load_robot(robot, gravity, lock, floating_base)
-        fitted, unseen = load_recordings(model, logs, held_out, split)
+        fitted, unseen = load_recordings(model, logs, held_out, split, said)
         with progress_bar(console) as progress:
             noise_too = any(one.needs_input_noise for one in estimators)
             preparation = prepare(model, fitted, settings, held_out=unseen, noise_too=noise_too, progress=progress)

@@ -9,6 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from casysid.cli.log_options import (
+    ConstantOption,
+    EfficiencyOption,
+    GearOption,
+    MapOption,
+    UnitsOption,
+    declared_of,
+)
 from casysid.cli.options import GravityOption, LockOption, RobotArgument, load_robot
 from casysid.cli.ranges import check_options, check_samples, numbers
 
@@ -26,6 +34,7 @@ if TYPE_CHECKING:
     )
     from casysid.excitation.results import Progress
     from casysid.outputs import Stage
+    from casysid.recording import Declared
     from casysid.robot import Robot
 
 
@@ -83,6 +92,11 @@ def excite(
     ] = None,
     starts: Annotated[int, typer.Option(help="Starts of the search.")] = 4,
     seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
+    units: UnitsOption = None,
+    columns: MapOption = None,
+    motor_constant: ConstantOption = None,
+    gear: GearOption = None,
+    efficiency: EfficiencyOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
     out: Annotated[
@@ -102,6 +116,7 @@ def excite(
         check_options(acceleration=acceleration, jerk=jerk, clearance=clearance, floor=floor, seed=seed)
         check_options(velocity_share=velocity_share, torque_share=torque_share)
         check_run_folder(out, ["excitation.csv", "excitation.json", "joint_trajectory.yaml", "excitation.txt"])
+        said = declared_of(units, columns, motor_constant, gear, efficiency)
         model = load_robot(robot, gravity, lock, floating_base=False)
         limits = limits_of(
             model,
@@ -119,11 +134,11 @@ def excite(
             rate=rate,
             limits=limits,
             clearance=clearance,
-            obstacles=_obstacles(floor, wall or [], box or []),
+            obstacles=obstacles_of(floor, wall or [], box or []),
             keep_in=_keep_in(model, keep_in or []),
             start=None if start is None else numbers("--start", start, model.nv),
         )
-        problem = _informed(model, problem, criterion, log or [])
+        problem = _informed(model, problem, criterion, log or [], said)
         with progress_bar(console) as progress:
             designs = design_set(problem, count, starts=starts, seed=seed, progress=_watch(progress))
             if any(design.status is DesignStatus.INTERRUPTED for design in designs):
@@ -154,7 +169,8 @@ def _series(limits: JointLimits, rate: float, period: float | None, harmonics: i
     )
 
 
-def _obstacles(floor: float | None, walls: list[str], boxes: list[str]) -> list[HalfSpace | Box]:
+def obstacles_of(floor: float | None, walls: list[str], boxes: list[str]) -> list[HalfSpace | Box]:
+    """What stands around the robot, from the command line's words."""
     import numpy as np
 
     from casysid.excitation import Box, HalfSpace
@@ -182,7 +198,9 @@ def _keep_in(robot: Robot, texts: list[str]) -> list[KeepInBlock]:
     return found
 
 
-def _informed(robot: Robot, problem: ExcitationProblem, choice: CriterionChoice, logs: list[Path]) -> ExcitationProblem:
+def _informed(
+    robot: Robot, problem: ExcitationProblem, choice: CriterionChoice, logs: list[Path], declared: Declared
+) -> ExcitationProblem:
     """The problem with the criterion chosen and what the logs tell."""
     from casysid.excitation import ConditionNumber, DOptimal, after_recordings, after_result, torque_accuracy
     from casysid.recording import read_recordings
@@ -197,7 +215,7 @@ def _informed(robot: Robot, problem: ExcitationProblem, choice: CriterionChoice,
     recordings = [path for path in logs if path not in results]
     for path in results:
         problem = after_result(problem, path)
-    return after_recordings(problem, read_recordings(recordings, robot)) if recordings else problem
+    return after_recordings(problem, read_recordings(recordings, robot, declared)) if recordings else problem
 
 
 def _preview(designs: tuple[ExcitationDesign, ...], stages: list[Stage]) -> str:

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from casysid.cli.log_options import (
+    ConstantOption,
+    EfficiencyOption,
+    GearOption,
+    MapOption,
+    UnitsOption,
+    declared_of,
+)
 from casysid.cli.options import (
     AccelerationNoiseOption,
+    ByOption,
     ConsistencyChoice,
     ConsistencyOption,
     CouplingOption,
@@ -17,14 +26,15 @@ from casysid.cli.options import (
     DelayOption,
     FlipOption,
     FloatingOption,
+    FoldersArgument,
     FrictionOption,
     FrictionWord,
     GravityOption,
     HeldOutOption,
     LockOption,
-    LogsArgument,
     PositionNoiseOption,
     RobotArgument,
+    SchedulerOption,
     SplitOption,
     TimeScaleOption,
     VelocityNoiseOption,
@@ -33,16 +43,23 @@ from casysid.cli.options import (
     make_settings,
     noise_levels,
 )
+from casysid.cli.ranges import check_options
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rich.console import Console
 
-    from casysid.identification import IdentificationResult
+    from casysid.identification import IdentificationResult, Settings
+    from casysid.identification.many import Fleet
+    from casysid.recording import Declared
+    from casysid.robot import Robot
 
 
 FILES = (
     *("result.json", "identified.urdf", "identified.xml", "drive.yaml"),
     *("model.json", "model.npz", "moments.npz", "report.html"),
+    *("fleet.json", "fleet.csv"),
 )
 SMALLEST_RUN = 2**15
 """Less than any run takes: that of two joints, without a choice of the low-pass, takes 108 kB [bytes]."""
@@ -50,9 +67,11 @@ SMALLEST_RUN = 2**15
 
 def identify(
     robot: RobotArgument,
-    logs: LogsArgument,
+    logs: FoldersArgument,
     held_out: HeldOutOption = None,
     split: SplitOption = None,
+    scheduler: SchedulerOption = None,
+    by: ByOption = None,
     method: Annotated[str, typer.Option(help="Estimator; 'casysid compare' lists them.")] = "empirical-bayes",
     consistency: ConsistencyOption = ConsistencyChoice.FULL,
     flip: FlipOption = None,
@@ -64,6 +83,11 @@ def identify(
     noise_velocity: VelocityNoiseOption = None,
     noise_acceleration: AccelerationNoiseOption = None,
     friction: FrictionOption = FrictionWord.AUTO,
+    units: UnitsOption = None,
+    columns: MapOption = None,
+    motor_constant: ConstantOption = None,
+    gear: GearOption = None,
+    efficiency: EfficiencyOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
     floating_base: FloatingOption = False,
@@ -75,30 +99,66 @@ def identify(
     ),
 ) -> None:
     """Identify the inertial and friction parameters of ROBOT from recordings."""
-    from casysid.cli.console import SOLVER_FAILED, progress_bar, speaking, tell_path
+    from casysid.cli.console import SOLVER_FAILED, progress_bar, rich_table, speaking, tell_path
 
     with speaking() as console:
         from casysid.estimation import Status
         from casysid.identification import identify as run
+        from casysid.identification.many.output import add_fleet, fleet_rows
         from casysid.identification.output import add_result, identity_of
         from casysid.outputs import check_run_folder
+        from casysid.readers.table import holds_logs
         from casysid.report import add_report
 
         check_run_folder(out, FILES, SMALLEST_RUN)
         noise = noise_levels(noise_position, noise_velocity, noise_acceleration)
         settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise, friction, flip)
+        said = declared_of(units, columns, motor_constant, gear, efficiency)
         model = load_robot(robot, gravity, lock, floating_base)
-        fitted, unseen = load_recordings(model, logs, held_out, split)
+        many = scheduler is not None or by is not None or any(map(holds_logs, logs))
+        fitted, unseen = ([], []) if many else load_recordings(model, logs, held_out, split, said)
+        fleet = None
         with progress_bar(console) as progress:
-            result = run(model, fitted, settings, held_out=unseen, progress=progress)
+            if many:
+                result, fleet = _run_many(model, logs, settings, held_out, split, said, scheduler, by, progress)
+            else:
+                result = run(model, fitted, settings, held_out=unseen, progress=progress)
             progress("write", 0.0)
             with console.run_folder(out, identity_of(result), claims=FILES) as stage:
                 notes = add_result(result, stage, export_inconsistent=export_inconsistent)
                 add_report(result, stage)
+                if fleet is not None:
+                    add_fleet(fleet, stage)
         tell_result(console, result, notes)
+        if fleet is not None:
+            console.print(rich_table("Differences between machines", *fleet_rows(fleet)))
         tell_path(out / "result.json")
     if result.status is not Status.CONVERGED:
         sys.exit(SOLVER_FAILED)
+
+
+def _run_many(
+    robot: Robot,
+    logs: list[Path],
+    settings: Settings,
+    held_out: list[Path] | None,
+    split: float | None,
+    said: Declared,
+    scheduler: str | None,
+    by: str | None,
+    progress: Callable[[str, float], None],
+) -> tuple[IdentificationResult, Fleet | None]:
+    """The answer of many recordings, and the machines where they are told apart."""
+    from casysid.identification.many import identify_fleet, identify_many
+
+    options: dict[str, Any] = dict(
+        held_out=held_out or (), split=split, declared=said, scheduler=scheduler, progress=progress
+    )
+    check_options(split=split)
+    if by is None:
+        return identify_many(robot, logs, settings, **options), None
+    fleet = identify_fleet(robot, logs, by, settings, **options)
+    return fleet.pooled, fleet
 
 
 def tell_result(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> None:

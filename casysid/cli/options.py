@@ -12,7 +12,7 @@ from casysid.cli.ranges import check_options, checked, numbers
 
 if TYPE_CHECKING:
     from casysid.identification import Settings
-    from casysid.recording import Source
+    from casysid.recording import Declared, Source
     from casysid.robot import Robot
     from casysid.signals import NoiseLevels
 
@@ -33,7 +33,29 @@ class FrictionWord(enum.StrEnum):
 
 
 RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="URDF or MJCF file, or a bundled model's name.")]
-LogsArgument = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings: CSV, CSV.gz, Parquet or NPZ.")]
+LogsArgument = Annotated[
+    list[Path], typer.Argument(metavar="LOG...", help="Recordings: text, Parquet, NPZ, bags and more; see README.")
+]
+FoldersArgument = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="LOG...", help="Recordings, or folders of them: text, Parquet, NPZ, bags and more; see README."
+    ),
+]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="local|ADDRESS",
+        help="Spread many recordings over processes here, or over a Dask cluster; for a folder of logs: local.",
+    ),
+]
+ByOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="COLUMN|recording",
+        help="One model for each machine, named by a column that is constant in each log, or for each recording.",
+    ),
+]
 HeldOutOption = Annotated[
     list[Path] | None,
     typer.Option("--held-out", metavar="LOG", help="A recording to predict, never fitted. Repeatable."),
@@ -110,7 +132,7 @@ def load_robot(
 
 
 def load_recordings(
-    robot: Robot, logs: list[Path], held_out: list[Path] | None, split: float | None
+    robot: Robot, logs: list[Path], held_out: list[Path] | None, split: float | None, declared: Declared
 ) -> tuple[list[Source], list[Source]]:
     """The fitted and the held-out recordings."""
     from casysid.identification.passes import is_long
@@ -119,7 +141,7 @@ def load_recordings(
     check_options(split=split)
     fitted, unseen = list[Source](), list[Source]()
     for files, several in ((logs, fitted), (held_out or [], unseen)):
-        opened = open_recordings(files, robot)
+        opened = open_recordings(files, robot, declared)
         several += opened if is_long(opened) else [one.in_memory() for one in opened]
     if split is None:
         return fitted, unseen

@@ -7,6 +7,14 @@ from typing import Annotated
 
 import typer
 
+from casysid.cli.log_options import (
+    ConstantOption,
+    EfficiencyOption,
+    GearOption,
+    MapOption,
+    UnitsOption,
+    declared_of,
+)
 from casysid.cli.options import (
     CutoffOption,
     DelayOption,
@@ -52,6 +60,11 @@ def payload(
     time_scale: TimeScaleOption = None,
     delay: DelayOption = "auto",
     friction: FrictionOption = FrictionWord.AUTO,
+    units: UnitsOption = None,
+    columns: MapOption = None,
+    motor_constant: ConstantOption = None,
+    gear: GearOption = None,
+    efficiency: EfficiencyOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
     floating_base: FloatingOption = False,
@@ -71,9 +84,10 @@ def payload(
         settings = make_settings(
             "empirical-bayes", ConsistencyChoice.FULL, cutoff, None, time_scale, delay, None, friction, flip
         )
+        said = declared_of(units, columns, motor_constant, gear, efficiency)
         model = load_robot(robot, gravity, lock, floating_base)
-        groups = {name: load_recordings(model, logs, None, None)[0] for name, logs in _by_name(with_).items()}
-        empty = load_recordings(model, without, None, None)[0] if without else ()
+        groups = {name: load_recordings(model, logs, None, None, said)[0] for name, logs in _by_name(with_).items()}
+        empty = load_recordings(model, without, None, None, said)[0] if without else ()
         with progress_bar(console) as progress:
             result = identify_payload(
                 model,

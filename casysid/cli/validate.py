@@ -8,6 +8,14 @@ from typing import Annotated
 
 import typer
 
+from casysid.cli.log_options import (
+    ConstantOption,
+    EfficiencyOption,
+    GearOption,
+    MapOption,
+    UnitsOption,
+    declared_of,
+)
 from casysid.cli.options import (
     FlipOption,
     FloatingOption,
@@ -35,6 +43,11 @@ def validate(
     cutoff: Annotated[
         float | None, typer.Option(help="Low-pass cut-off [Hz]; default: the result's, else chosen by the data.")
     ] = None,
+    units: UnitsOption = None,
+    columns: MapOption = None,
+    motor_constant: ConstantOption = None,
+    gear: GearOption = None,
+    efficiency: EfficiencyOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
     floating_base: FloatingOption = False,
@@ -53,8 +66,9 @@ def validate(
 
         check_options(cutoff=cutoff)
         check_run_folder(out, ["validation.json"])
+        said = declared_of(units, columns, motor_constant, gear, efficiency)
         model = load_robot(robot, gravity, lock, floating_base)
-        recordings = read_recordings(logs, model)
+        recordings = read_recordings(logs, model, said)
         earlier = read_earlier_result(result) if result else EarlierResult()
         if flip:
             earlier = dataclasses.replace(earlier, flip=tuple(flip))

@@ -22,6 +22,12 @@ def contiguous_folds(blocks: int, folds: int) -> list[npt.NDArray[np.intp]]:
     return np.array_split(np.arange(blocks), min(folds, blocks))
 
 
+def interleaved_folds(blocks: int, folds: int) -> list[npt.NDArray[np.intp]]:
+    """Indices of the blocks of each fold, every so many: no fold has a part of the motion to itself."""
+    count = min(folds, blocks)
+    return [np.arange(k, blocks, count) for k in range(count)]
+
+
 def cross_validate(
     problem: StandardisedProblem, folds: int, fit_candidates: Callable[[NormalEquations], Array], *, choice: str
 ) -> Array:

@@ -16,9 +16,12 @@ from casysid.arrays import Array
 from casysid.errors import ParameterError
 from casysid.estimation.base import Estimate, Estimator, Feasible, Status
 from casysid.estimation.covariance import covariance_from_blocks
-from casysid.estimation.evidence import build_evidence_problem, centre_of, seen_columns
+from casysid.estimation.evidence import Start, build_evidence_problem, centre_of, seen_columns
 from casysid.estimation.standardise import check_prior
 from casysid.moments import Moments
+
+SIZE, INFLATION = "size_", "score_inflation"
+"""Names among the diagnostics."""
 
 
 @dataclass(frozen=True)
@@ -29,11 +32,13 @@ class EmpiricalBayes(Estimator):
         iterations: At most.
         tolerance: Of the change of the parameters in units of their noise.
         standard_errors: Whether the covariance is taken from blocks; it is the posterior's without, which is faster.
+        like: The estimate of a similar model from the same rows, from whose sizes and variances the search goes on.
     """
 
     iterations: int = 100
     tolerance: float = 3e-3
     standard_errors: bool = True
+    like: Estimate | None = None
     name: ClassVar[str] = "empirical-bayes"
 
     def __post_init__(self) -> None:
@@ -56,6 +61,13 @@ class EmpiricalBayes(Estimator):
         """The same, sizes and variances being those of the most probable among the possible parameters."""
         return self._estimate(moments, prior, feasible)
 
+    def _start(self) -> Start | None:
+        if self.like is None:
+            return None
+        said = self.like.diagnostics
+        sizes = {name.removeprefix(SIZE): size for name, size in said.items() if name.startswith(SIZE)}
+        return Start(self.like.noise_std**2, said[INFLATION], sizes)
+
     def _estimate(self, moments: Moments, prior: Array | None, feasible: Feasible | None) -> Estimate:
         centre = centre_of(moments, check_prior(moments, prior))
         problem = build_evidence_problem(moments, centre)
@@ -63,6 +75,7 @@ class EmpiricalBayes(Estimator):
             self.iterations,
             self.tolerance,
             None if feasible is None else lambda mean, P, energy: feasible(centre + mean, P, energy) - centre,
+            self._start(),
         )
         weights = 1.0 / fit.variance
         size, seen = np.sqrt(fit.kappa / fit.size_by_column), seen_columns(moments)
@@ -81,9 +94,9 @@ class EmpiricalBayes(Estimator):
             rank=round(sum(fit.decided.values())),
             status=fit.status if seen.any() else Status.DEGENERATE,
             diagnostics={
-                "score_inflation": fit.kappa,
+                INFLATION: fit.kappa,
                 "iterations": float(fit.iterations),
-                **{f"size_{name}": found for name, found in fit.sizes.items()},
+                **{f"{SIZE}{name}": found for name, found in fit.sizes.items()},
                 **{f"decided_{name}": number for name, number in fit.decided.items()},
             },
         )

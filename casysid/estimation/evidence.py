@@ -14,7 +14,7 @@ the variances); Varin, Reid and Firth 2011, *An overview of composite likelihood
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -93,6 +93,14 @@ def centre_of(moments: Moments, prior: Array) -> Array:
     return centre
 
 
+class Start(NamedTuple):
+    """Where a search begins: variances of the joints' rows, ``κ``, and sizes by the names of groups."""
+
+    variance: Array
+    kappa: float
+    sizes: Mapping[str, float]
+
+
 @dataclass(frozen=True, eq=False)
 class EvidenceFit:
     """The fit of most evidence.
@@ -142,16 +150,23 @@ class EvidenceProblem:
     start: Array
     floor: Array
 
-    def maximise(self, iterations: int, tolerance: float, feasible: Feasible | None = None) -> EvidenceFit:
+    def maximise(
+        self, iterations: int, tolerance: float, feasible: Feasible | None = None, start: Start | None = None
+    ) -> EvidenceFit:
         """Iterate posterior, variances, sizes and inflation until none of them moves.
 
         Args:
             iterations: At most.
             tolerance: Of the change of ``δ`` in units of its noise.
             feasible: Gives the possible ``δ`` nearest to one; None when all are possible.
+            start: Where to begin; None with weighted least squares and sizes of one.
         """
         totals = [sums.sum(axis=0) for sums in self.moments.squares]
-        variance, kappa, sizes = self.start.copy(), 1.0, np.ones(len(self.groups))
+        start = start or Start(self.start, 1.0, {})
+        variance, kappa = start.variance.copy(), start.kappa
+        sizes = np.array([start.sizes.get(group.name, 1.0) for group in self.groups])
+        new_groups = np.array([group.name not in start.sizes for group in self.groups])
+        settled_after = 0 if start.sizes else INFLATION_EVERY
         delta, status = np.zeros(len(self.covariance)), Status.MAX_ITERATIONS
         for iteration in range(1, iterations + 1):
             normal = self.moments.pooled(1.0 / (kappa * variance))
@@ -164,12 +179,12 @@ class EvidenceProblem:
             moved, delta = float(np.sqrt(max(float(step @ normal.xx @ step), 0.0))), new
             variance = self._variances(totals, delta, C)
             decided = np.array([self._decided(group, C, size) for group, size in zip(self.groups, sizes, strict=True)])
-            wanted: Array = self._sizes(delta, C, decided, careful=iteration <= CAREFUL_ROUNDS)
+            wanted: Array = self._sizes(delta, C, decided, new_groups & (iteration <= CAREFUL_ROUNDS))
             change = float((np.abs(np.log(wanted / sizes)) * np.minimum(decided, 1.0)).max(initial=0.0))
             sizes = wanted
             if iteration % INFLATION_EVERY == 1:
                 kappa = self._inflation(delta, variance)
-            if iteration > INFLATION_EVERY and moved < tolerance and change < STEADY:
+            if iteration > settled_after and moved < tolerance and change < STEADY:
                 status = Status.CONVERGED
                 break
         names = [group.name for group in self.groups]
@@ -206,15 +221,15 @@ class EvidenceProblem:
         left = float(np.sum(self.precision[g[:, None], g] * C[g[:, None], g])) / size
         return min(max(len(g) - left, np.finfo(np.float64).eps), float(len(g)))
 
-    def _sizes(self, delta: Array, C: Array, decided: Array, *, careful: bool) -> Array:
-        """MacKay's update; that of expectation-maximisation in the first rounds, and where nothing is decided."""
+    def _sizes(self, delta: Array, C: Array, decided: Array, careful: npt.NDArray[np.bool_]) -> Array:
+        """MacKay's update; that of expectation-maximisation in a group's first rounds, and where nothing is decided."""
         found = []
-        for group, gamma in zip(self.groups, decided, strict=True):
+        for group, gamma, first in zip(self.groups, decided, careful, strict=True):
             g = group.columns
             Q = self.precision[g[:, None], g]
             length = float(delta[g] @ Q @ delta[g])
             open_still = (length + float(np.sum(Q * C[g[:, None], g]))) / len(g)
-            found.append(open_still if careful or gamma < UNDECIDED else length / gamma)
+            found.append(open_still if first or gamma < UNDECIDED else length / gamma)
         return np.asarray(np.clip(np.array(found, dtype=np.float64), *SIZES))
 
     def _inflation(self, delta: Array, variance: Array) -> float:

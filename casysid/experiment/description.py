@@ -35,6 +35,11 @@ _ROBOT: _Known = {
     "floating_base": (truth, False),
 }
 _RECORDING: _Known = {"file": (text, KeyError), "role": (word(FIT, HELD_OUT, PAYLOAD), FIT), "payload": (text, None)}
+_LOG: _Known = {
+    "units": (texts, ()),
+    "map": (text, None),
+    **{name: (texts, ()) for name in ("motor_constant", "gear", "efficiency")},
+}
 _SETTINGS: _Known = {
     "method": (text, "empirical-bayes"),
     "consistency": (word("none", "inertia", "full"), "full"),
@@ -81,6 +86,7 @@ class Experiment:
     Attributes:
         robot: Robot's file, gravity, locked joints, floating base.
         recordings: With their roles.
+        log: What the recordings' columns hold, as ``--units``, ``--map`` and the like of ``casysid identify``.
         settings: As the options of ``casysid identify``; None lets the data decide.
         payload: Link that holds payloads, and known masses by name.
         outputs: Folder and files.
@@ -89,6 +95,7 @@ class Experiment:
 
     robot: Mapping[str, Any]
     recordings: tuple[RecordingEntry, ...]
+    log: Mapping[str, Any]
     settings: Mapping[str, Any]
     payload: Mapping[str, Any]
     outputs: Mapping[str, Any]
@@ -109,7 +116,8 @@ class Experiment:
     @property
     def inputs(self) -> list[Path]:
         """All files that are read."""
-        return list(dict.fromkeys([Path(self.robot["file"]), *(one.file for one in self.recordings)]))
+        maps = [Path(self.log["map"])] if self.log["map"] else []
+        return list(dict.fromkeys([Path(self.robot["file"]), *maps, *(one.file for one in self.recordings)]))
 
     def to_toml(self, versions: Mapping[str, str], sha256: Mapping[str, str]) -> str:
         """The file with nothing left open, and what it was run with."""
@@ -119,7 +127,7 @@ class Experiment:
         ]
         for one in self.recordings:
             lines += _table("[recordings]", {"file": str(one.file), "role": one.role, "payload": one.payload})
-        for name in ("settings", "payload", "outputs"):
+        for name in ("log", "settings", "payload", "outputs"):
             lines += _table(name, getattr(self, name))
         provenance = {"casysid": versions["casysid"], "versions": versions, "sha256": sha256}
         return "\n".join([*lines, *_table("provenance", provenance)]) + "\n"
@@ -153,7 +161,7 @@ def _experiment(content: dict[str, Any], home: Path) -> Experiment:
         {
             "robot": (table, KeyError),
             "recordings": (anything, KeyError),
-            **{name: (table, {}) for name in ("settings", "payload", "outputs", "provenance")},
+            **{name: (table, {}) for name in ("log", "settings", "payload", "outputs", "provenance")},
         },
     )
     robot = checked_table(sections["robot"], "[robot]", _ROBOT)
@@ -167,10 +175,12 @@ def _experiment(content: dict[str, Any], home: Path) -> Experiment:
     if not any(one["role"] == FIT for one in entries):
         raise ParameterError(f"[[recordings]]: at least one must have the role '{FIT}'")
     provenance = checked_table(sections["provenance"], "[provenance]", _PROVENANCE)
+    log = checked_table(sections["log"], "[log]", _LOG)
     outputs = checked_table(sections["outputs"], "[outputs]", _OUTPUTS)
     return Experiment(
         robot={**robot, "file": _robot_file(robot["file"], home)},
         recordings=tuple(RecordingEntry(home / one["file"], one["role"], one["payload"]) for one in entries),
+        log={**log, "map": None if log["map"] is None else str(home / log["map"])},
         settings=checked_table(sections["settings"], "[settings]", _SETTINGS),
         payload=checked_table(sections["payload"], "[payload]", _PAYLOAD),
         outputs={**outputs, "folder": str(home / outputs["folder"])},

@@ -23,7 +23,7 @@ from casysid.inertia import Consistency
 from casysid.model.c_code import c_files
 from casysid.outputs import Stage, run_folder
 from casysid.payload import PayloadResult, identify_payload
-from casysid.recording import Source, open_recordings
+from casysid.recording import Declared, Source, open_recordings, parse_drive, parse_units, read_map
 from casysid.report import add_report
 from casysid.robot import Robot
 from casysid.signals import NoiseLevels
@@ -89,11 +89,12 @@ def run_experiment(experiment: Experiment, *, progress: Progress = silent, folde
     robot = Robot.from_file(
         asked["file"], gravity=asked["gravity"], floating_base=asked["floating_base"], locked=asked["lock"]
     )
-    fitted, unseen = (_opened(experiment.of_role(role), robot) for role in (FIT, HELD_OUT))
+    said = declared_of(experiment.log)
+    fitted, unseen = (_opened(experiment.of_role(role), robot, said) for role in (FIT, HELD_OUT))
     if experiment.settings["split"] is not None:
         halves = [one.split(experiment.settings["split"]) for one in fitted]
         fitted, unseen = [first for first, _ in halves], [second for _, second in halves] + unseen
-    groups = {name: _opened(files, robot) for name, files in experiment.payloads().items()}
+    groups = {name: _opened(files, robot, said) for name, files in experiment.payloads().items()}
     result = identify(robot, fitted, settings, held_out=unseen, progress=progress)
     payloads = _payloads(experiment, robot, groups, fitted, settings, progress)
     progress("write", 0.0)
@@ -130,14 +131,25 @@ def settings_of(table: Mapping[str, Any]) -> Settings:
     )
 
 
+def declared_of(table: Mapping[str, Any]) -> Declared:
+    """What an experiment's table says of the recordings' columns; the table comes before the map's file."""
+    said = Declared(
+        units=parse_units(table["units"]),
+        motor_constant=parse_drive("motor_constant", "constant", table["motor_constant"]),
+        gear=parse_drive("gear", "gear", table["gear"]),
+        efficiency=parse_drive("efficiency", "efficiency", table["efficiency"]),
+    )
+    return said if table["map"] is None else said.over(read_map(Path(table["map"])))
+
+
 def _noise(levels: Sequence[float] | None) -> float | tuple[float, ...] | None:
     if levels is None:
         return None
     return levels[0] if len(levels) == 1 else tuple(levels)
 
 
-def _opened(files: Sequence[Path], robot: Robot) -> list[Source]:
-    opened = open_recordings(files, robot) if files else []
+def _opened(files: Sequence[Path], robot: Robot, said: Declared) -> list[Source]:
+    opened = open_recordings(files, robot, said) if files else []
     return list(opened) if is_long(opened) else [one.in_memory() for one in opened]
 
 

@@ -7,9 +7,10 @@ the length. What is chosen from the data is then chosen by excerpts.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cached_property, partial
 from itertools import repeat
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,7 @@ import numpy.typing as npt
 from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
 from casysid.dynamics import Regressor, continued_positions
+from casysid.identification.prediction import ErrorSums, TorqueError, error_sums, torque_errors
 from casysid.identification.tuning.band import BandChoice
 from casysid.moments import Moments
 from casysid.recording import Source
@@ -36,7 +38,12 @@ MINIMUM_BLOCKS = 4
 EXCERPTS, EXCERPT_ROWS = 8, 1 << 14
 """Of a long recording: a quarter of a minute each at 1 kHz. A motion of seven joints then takes some 30 MB."""
 
+SHORTEST_EXCERPT = 1 << 12
+"""Rows of an excerpt at least, where recordings have as many: a few seconds at 1 kHz, some periods of any motion."""
+
 Mask = npt.NDArray[np.bool_]
+Mapped = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
+"""Does one thing to each recording, in their order: ``map``, or other processes and machines."""
 
 
 def is_long(recordings: Sequence[Source]) -> bool:
@@ -44,13 +51,27 @@ def is_long(recordings: Sequence[Source]) -> bool:
     return sum(map(len, recordings)) > EXCERPTS * EXCERPT_ROWS and all(one.has_time for one in recordings)
 
 
-def excerpts(recordings: Sequence[Source]) -> tuple[Source, ...]:
-    """The recordings themselves, or of long ones excerpts, evenly over each."""
+def excerpts(recordings: Sequence[Source], mapped: Mapped = map) -> tuple[Source, ...]:
+    """The recordings themselves, or of long ones excerpts, evenly over each; of very many, evenly over some.
+
+    Args:
+        recordings: At least one.
+        mapped: Cuts them.
+    """
     if not is_long(recordings):
         return tuple(recordings)
+    rows = min(SHORTEST_EXCERPT, max(map(len, recordings)))
+    most = max(EXCERPT_ROWS * EXCERPTS // rows, 1)
+    if len(recordings) > most:
+        recordings = [recordings[k] for k in np.linspace(0, len(recordings) - 1, most).round().astype(int).tolist()]
     share = EXCERPT_ROWS * EXCERPTS // len(recordings)
-    count = max(1, min(EXCERPTS, share // 4096))
-    return tuple(part for one in recordings for part in one.excerpts(count, max(share // count, 1)))
+    count = max(1, min(EXCERPTS, share // SHORTEST_EXCERPT))
+    cut = partial(_excerpts_of, count=count, rows=max(share // count, 1))
+    return tuple(part for parts in mapped(cut, recordings) for part in parts)
+
+
+def _excerpts_of(recording: Source, count: int, rows: int) -> tuple[Source, ...]:
+    return recording.excerpts(count, rows)
 
 
 class Passes:
@@ -62,6 +83,7 @@ class Passes:
         band: Cut-offs.
         smoothings: How often each recording was smoothed.
         passes: How often the equations of each recording were evaluated.
+        blocks: Blocks of each recording in the moments that were summed last.
     """
 
     def __init__(
@@ -73,6 +95,7 @@ class Passes:
         delays: Array | None = None,
         blocks: int = 20,
         threads: int = 2,
+        mapped: Mapped = map,
     ) -> None:
         """Nothing is done yet.
 
@@ -83,10 +106,12 @@ class Passes:
             delays: By which each degree of freedom's torque is late, shape (nv,), [s].
             blocks: Blocks of time in all.
             threads: Of the regressor's evaluation.
+            mapped: Sums long recordings, one by one.
         """
         self.robot, self.recordings, self.band = robot, tuple(recordings), band
         self.smoothings = self.passes = 0
-        self._delays, self._blocks, self._threads = delays, blocks, threads
+        self.blocks: tuple[int, ...] = ()
+        self._delays, self._blocks, self._threads, self._mapped = delays, blocks, threads, mapped
 
     @cached_property
     def motions(self) -> tuple[Motion, ...]:
@@ -149,17 +174,55 @@ class Passes:
     def moments(self, regressor: Regressor) -> Moments:
         """One pass: moments of all recordings, their blocks one after the other, equations near rest apart."""
         self.passes += 1
-        if is_long(self.recordings):
-            self.smoothings += 1
-            return _added([self._long_moments(regressor, one) for one in self.recordings]).with_rows_only()
-        return sum_moments(
-            regressor,
-            self.sparse_motions,
-            self.band.cutoff,
-            near_rest=self.near_rest,
-            blocks=self.blocks_of_each(),
-            threads=self._threads,
+        parts = self._long_moments(regressor) if is_long(self.recordings) else self._short_moments(regressor)
+        self.blocks = tuple(part.blocks for part in parts)
+        return added(parts).with_rows_only()
+
+    def _long_moments(self, regressor: Regressor) -> list[Moments]:
+        self.smoothings += 1
+        return list(self._mapped(partial(_long_moments, self._alone(), regressor), self.recordings))
+
+    def _short_moments(self, regressor: Regressor) -> list[Moments]:
+        return [
+            sum_moments(
+                regressor,
+                [motion],
+                self.band.cutoff,
+                near_rest=mask,
+                blocks=self.blocks_of_each(),
+                threads=self._threads,
+                only_rows=False,
+            )
+            for motion, mask in zip(self.sparse_motions, self._masks(), strict=True)
+        ]
+
+    def _masks(self) -> list[list[Mask] | None]:
+        return [None] * len(self.recordings) if self.near_rest is None else [[mask] for mask in self.near_rest]
+
+    def errors(
+        self, regressor: Regressor, parameters: Sequence[Array], cutoff: float | None
+    ) -> tuple[TorqueError, ...]:
+        """One pass: the torque errors of several parameter vectors over all recordings.
+
+        Of long ones, curves are kept of the first piece only.
+        """
+        if not is_long(self.recordings):
+            return torque_errors(regressor, parameters, self.all_motions(), cutoff)
+        self.passes += 1
+        self.smoothings += 1
+        work = partial(_error_sums, self._alone(), regressor, parameters, cutoff)
+        total = [ErrorSums() for _ in parameters]
+        for found in self._mapped(work, [(one, k == 0) for k, one in enumerate(self.recordings)]):
+            for sums, more in zip(total, found, strict=True):
+                sums.join(more)
+        return tuple(sums.error() for sums in total)
+
+    def _alone(self) -> Passes:
+        """What the pass over one of these long recordings has to know, without any of them."""
+        alone = Passes(
+            self.robot, (), self.band, delays=self._delays, blocks=self.blocks_of_each(), threads=self._threads
         )
+        return alone.like(self) if "width" in self.__dict__ else alone
 
     def all_motions(self) -> Iterator[Motion]:
         """One pass over the motions at all their samples, of long recordings piece by piece."""
@@ -169,8 +232,12 @@ class Passes:
             return
         self.smoothings += 1
         for recording in self.recordings:
-            for piece in motion_pieces(self.robot, recording, self.band.smoothing, delays=self._delays):
-                yield piece.motion.rows(piece.core)
+            yield from self.pieces(recording)
+
+    def pieces(self, recording: Source) -> Iterator[Motion]:
+        """The motion of a long recording at all its samples, piece by piece."""
+        for piece in motion_pieces(self.robot, recording, self.band.smoothing, delays=self._delays):
+            yield piece.motion.rows(piece.core)
 
     def like(self, other: Passes) -> Passes:
         """These, with the widths of other passes over the same motions."""
@@ -180,15 +247,21 @@ class Passes:
     def disturbed(self, recordings: Sequence[Source]) -> Passes:
         """Passes over the same recordings with other noise: the same equations are near rest."""
         other = Passes(
-            self.robot, recordings, self.band, delays=self._delays, blocks=self._blocks, threads=self._threads
+            self.robot,
+            recordings,
+            self.band,
+            delays=self._delays,
+            blocks=self._blocks,
+            threads=self._threads,
+            mapped=self._mapped,
         )
         if not is_long(self.recordings):
             other.__dict__["near_rest"] = self.near_rest
         return other.like(self)
 
-    def _long_moments(self, regressor: Regressor, recording: Source) -> Moments:
-        """Of one recording, piece by piece; windows end with their piece."""
-        blocks, groups = self.blocks_of_each(), dict[int, Moments]()
+    def long_moments(self, regressor: Regressor, recording: Source) -> Moments:
+        """Of one recording in as many blocks as were asked for, piece by piece; windows end with their piece."""
+        blocks, groups = self._blocks, dict[int, Moments]()
         for piece in motion_pieces(
             self.robot, recording, self.band.smoothing, delays=self._delays, multiple=self._stride(recording)
         ):
@@ -207,7 +280,7 @@ class Passes:
             share = (motion.time[0] - recording.start) / max(recording.duration, np.finfo(np.float64).tiny)
             place = min(int(blocks * share), blocks - 1)
             groups[place] = (groups[place] + found).merged_blocks([[0, 1]]) if place in groups else found
-        return _added([groups[place] for place in sorted(groups)])
+        return added([groups[place] for place in sorted(groups)])
 
     def _near_rest(self, motion: Motion) -> Mask:
         return np.asarray(motion.standing | (np.abs(motion.v) < NEAR_REST * self.width))
@@ -218,6 +291,17 @@ class Passes:
             return 1
         stride = max(int(recording.rate / (SAMPLES_PER_PERIOD * self.band.cutoff)), 1)
         return stride - 1 + stride % 2
+
+
+def _long_moments(alone: Passes, regressor: Regressor, recording: Source) -> Moments:
+    return alone.long_moments(regressor, recording)
+
+
+def _error_sums(
+    alone: Passes, regressor: Regressor, parameters: Sequence[Array], cutoff: float | None, item: tuple[Source, bool]
+) -> list[ErrorSums]:
+    recording, shown = item
+    return error_sums(regressor, parameters, alone.pieces(recording), cutoff, curves=int(shown))
 
 
 def sum_moments(
@@ -255,15 +339,15 @@ def sum_moments(
         )
         for motion, mask in zip(motions, near_rest or repeat(None), strict=False)
     ]
-    total = _added(parts)
+    total = added(parts)
     return total.with_rows_only() if only_rows else total
 
 
-def _added(parts: Sequence[Moments]) -> Moments:
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part
-    return total
+def added(parts: Sequence[Moments]) -> Moments:
+    """The blocks of all, one after the other; in pairs, so that of many parts none is copied often."""
+    while len(parts) > 1:
+        parts = [sum(parts[k + 1 : k + 2], parts[k]) for k in range(0, len(parts), 2)]
+    return parts[0]
 
 
 def _sparse(motion: Motion, stride: int) -> Motion:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.dynamics import Regressor
+from casysid.dynamics import JointUse, Regressor
 from casysid.errors import CasysidWarning, RecordingError
 from casysid.estimation import Estimate
 from casysid.identifiability import BaseParameters, excited_base_parameters, structural_base_parameters
@@ -19,8 +19,8 @@ from casysid.identification.choices import Choices
 from casysid.identification.friction_laws import friction_laws
 from casysid.identification.mistakes import find_mistakes
 from casysid.identification.noise_moments import with_noise
-from casysid.identification.passes import Passes, excerpts, is_long
-from casysid.identification.prediction import torque_errors
+from casysid.identification.order import as_given, places_by_content
+from casysid.identification.passes import Mapped, Passes, excerpts, is_long
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 from casysid.identification.tuning.band import BandChoice, choose_band
@@ -28,11 +28,20 @@ from casysid.identification.tuning.candidates import Candidates, final_regressor
 from casysid.identification.tuning.clock import choose_clock
 from casysid.identification.tuning.delay import choose_delay
 from casysid.identification.tuning.drive_gains import choose_drive_gains
-from casysid.identification.tuning.friction_selection import FrictionChoice, select_friction
+from casysid.identification.tuning.friction_selection import FrictionChoice, fit_model, select_friction
+from casysid.identification.tuning.ripples import ripple_uses
 from casysid.moments import Moments
-from casysid.projection import ProjectionProblem, ProjectionResult, build_projection, possible_parameters, project
+from casysid.projection import (
+    KeptLink,
+    PossibleParameters,
+    ProjectionProblem,
+    ProjectionResult,
+    build_projection,
+    project,
+)
 from casysid.recording import Source
 from casysid.robot import Robot
+from casysid.robot.likely_bodies import believed
 from casysid.signals import InputNoise, Motion
 from casysid.signals.admission import FEWEST, FEWEST_TO_PREDICT, check_noise, check_recordings
 from casysid.threads import single_threaded
@@ -53,9 +62,9 @@ class Preparation:
     """All that is read from the data: what every estimator starts from.
 
     Attributes:
-        robot: The robot.
+        robot: The robot as its file has it.
         choices: What was chosen on the way.
-        regressor: With the friction that was chosen.
+        regressor: With the friction that was chosen; its prior is the file's without what no body can be.
         moments: Of the fitted recordings, with what noise added if some method needs it.
         motions: Of the fitted recordings, or of excerpts of long ones.
         held_out: Motions that are only predicted, alike.
@@ -63,6 +72,7 @@ class Preparation:
         unseen: Over the recordings that are only predicted; None if there are none.
         input_noise: Of the measured motion; None where no method needs it, or it is not known.
         structural: Base parameters of the mechanism.
+        places: In the order of the moments' blocks, the places of the fitted recordings as they were given.
         seconds: Wall time by stage.
     """
 
@@ -76,6 +86,7 @@ class Preparation:
     unseen: Passes | None
     input_noise: InputNoise | None
     structural: BaseParameters
+    places: tuple[int, ...]
     seconds: dict[str, float]
 
 
@@ -116,6 +127,7 @@ def prepare(
     held_out: Sequence[Source] = (),
     noise_too: bool = False,
     progress: Progress = silent,
+    mapped: Mapped = map,
 ) -> Preparation:
     """Choose what the data decide, and take the moments.
 
@@ -126,6 +138,7 @@ def prepare(
         held_out: Likewise.
         noise_too: Whether what noise adds to the moments is wanted although ``settings.method`` does not need it.
         progress: Likewise.
+        mapped: Does one thing to each of many recordings: cuts excerpts, sums equations and errors.
     """
     fitted = (recordings,) if isinstance(recordings, Source) else tuple(recordings)
     if not fitted:
@@ -137,8 +150,13 @@ def prepare(
     check_noise(fitted, settings.input_noise)
     clock = _Clock()
     fitted, held_out = (tuple(one.flipped(settings.flip) for one in several) for several in (fitted, held_out))
+    places = places_by_content(fitted)
+    fitted = tuple(fitted[place] for place in places)
     progress("tuning", 0.0)
-    chosen = _choose(robot, fitted, settings, progress)
+    witness = believed(robot, [known.link for known in settings.knowledge if isinstance(known, KeptLink)])
+    if witness.sentence:
+        warnings.warn(witness.sentence, CasysidWarning, stacklevel=3)
+    chosen = _choose(witness.robot, fitted, settings, progress, mapped)
     clock.lap("tuning")
     progress("moments", 0.0)
     regressor, moments, passes = chosen.regressor, chosen.moments, chosen.passes
@@ -146,7 +164,8 @@ def prepare(
     if noise_too or settings.method.needs_input_noise:
         moments, noise = with_noise(moments, regressor, passes, settings.input_noise)
     scale, delay, band = chosen.choices.clock.scale, chosen.choices.delay, chosen.choices.band
-    unseen = Passes(robot, [one.with_time_scaled(scale) for one in held_out], band, delays=delay.seconds)
+    later = [one.with_time_scaled(scale) for one in held_out]
+    unseen = Passes(witness.robot, later, band, delays=delay.seconds, mapped=mapped)
     structural = structural_base_parameters(regressor)
     clock.lap("moments")
     progress("moments", 1.0)
@@ -155,21 +174,22 @@ def prepare(
         choices=chosen.choices,
         regressor=regressor,
         moments=moments,
-        motions=chosen.looked_at.motions,
-        held_out=_shown(unseen),
+        motions=as_given(chosen.looked_at.motions, places),
+        held_out=_shown(unseen, mapped),
         passes=passes,
         unseen=unseen if held_out else None,
         input_noise=noise,
         structural=structural,
+        places=places,
         seconds=clock.laps,
     )
 
 
-def _shown(passes: Passes) -> tuple[Motion, ...]:
+def _shown(passes: Passes, mapped: Mapped) -> tuple[Motion, ...]:
     """The motions of recordings, or of excerpts of long ones."""
     if not is_long(passes.recordings):
         return passes.motions
-    return Passes(passes.robot, excerpts(passes.recordings), passes.band).motions
+    return Passes(passes.robot, excerpts(passes.recordings, mapped), passes.band).motions
 
 
 @single_threaded()
@@ -179,24 +199,22 @@ def solve(preparation: Preparation, settings: Settings, *, progress: Progress = 
     clock = _Clock()
     progress("estimate", 0.0)
     problem = _projection_problem(regressor, settings)
-    if problem is None:
-        estimate = settings.method.estimate(moments, prior)
-    else:
-        estimate = settings.method.estimate_among(moments, prior, possible_parameters(problem, prior))
+    estimate = _estimate(regressor, moments, settings, problem)
     clock.lap("estimate")
     progress("estimate", 1.0)
     progress("projection", 0.0)
-    projection, uncertainty = _project(preparation, problem, estimate)
+    projection, uncertainty = _project(regressor, moments, problem, estimate)
     clock.lap("projection")
     progress("projection", 1.0)
     progress("check", 0.0)
     parameters = estimate.parameters if projection is None else projection.parameters
     band = preparation.choices.band.errors
     passes, unseen = preparation.passes, preparation.unseen
-    vectors = [parameters, estimate.parameters, prior]
+    own = preparation.robot.inertial_parameters
+    vectors = [parameters, estimate.parameters, np.concatenate([own, prior[own.size :]])]
     fitted = [parameters] if unseen else vectors
-    errors = torque_errors(regressor, fitted, passes.all_motions(), band)
-    judged = torque_errors(regressor, vectors, unseen.all_motions(), band) if unseen else errors
+    errors = tuple(one.as_given(preparation.places) for one in passes.errors(regressor, fitted, band))
+    judged = unseen.errors(regressor, vectors, band) if unseen else errors
     result = IdentificationResult(
         robot=preparation.robot,
         settings=settings,
@@ -233,11 +251,27 @@ def _projection_problem(regressor: Regressor, settings: Settings) -> ProjectionP
     )
 
 
+def fit(
+    regressor: Regressor, moments: Moments, settings: Settings
+) -> tuple[Estimate, ProjectionResult | None, ParameterUncertainty]:
+    """Estimate and make consistent, from moments alone; see :func:`solve`."""
+    problem = _projection_problem(regressor, settings)
+    estimate = _estimate(regressor, moments, settings, problem)
+    return (estimate, *_project(regressor, moments, problem, estimate))
+
+
+def _estimate(
+    regressor: Regressor, moments: Moments, settings: Settings, problem: ProjectionProblem | None
+) -> Estimate:
+    if problem is None:
+        return settings.method.estimate(moments, regressor.prior)
+    return settings.method.estimate_among(moments, regressor.prior, PossibleParameters(problem, regressor.prior))
+
+
 def _project(
-    preparation: Preparation, problem: ProjectionProblem | None, estimate: Estimate
+    regressor: Regressor, moments: Moments, problem: ProjectionProblem | None, estimate: Estimate
 ) -> tuple[ProjectionResult | None, ParameterUncertainty]:
     """The nearest consistent parameters in the estimate's own metric, None if not asked for; and how sure they are."""
-    regressor, moments = preparation.regressor, preparation.moments
     if problem is None:
         return None, propagate(estimate, moments, regressor.parameters)
     energy = moments.pooled(estimate.noise_std**-2.0).residual_energy(estimate.parameters)
@@ -258,9 +292,11 @@ class _Chosen:
     looked_at: Passes
 
 
-def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, progress: Progress) -> _Chosen:
+def _choose(
+    robot: Robot, recordings: Sequence[Source], settings: Settings, progress: Progress, mapped: Mapped
+) -> _Chosen:
     """Band, clock, delay, friction and gains, each given those before; recordings are smoothed anew for a new clock."""
-    whole, recordings = recordings, excerpts(recordings)
+    whole, recordings = recordings, excerpts(recordings, mapped)
     band = choose_band(whole, settings.cutoff)
     passes, candidates = _gather(robot, recordings, band, settings)
     progress("tuning", 0.3)
@@ -279,11 +315,13 @@ def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, prog
         warnings.warn(mistake.sentence, CasysidWarning, stacklevel=4)
     progress("tuning", 0.5)
     delay = choose_delay(passes, candidates.base, settings.delay)
-    if not delay.is_none:
-        passes, candidates = _gather(robot, recordings, band, settings, delay.seconds)
+    usual = fit_model(candidates, candidates.model(), settings) if candidates.proposals else None
+    uses = None if usual is None else ripple_uses(passes, candidates, usual)
+    if uses or not delay.is_none:
+        passes, candidates = _gather(robot, recordings, band, settings, delay.seconds, uses)
         work.append(passes)
     progress("tuning", 0.7)
-    friction = select_friction(candidates, settings) if candidates.proposals else FrictionChoice(settings)
+    friction = select_friction(candidates, settings, usual) if usual else FrictionChoice(settings)
     regressor = final_regressor(candidates, settings, [proposal for proposal, _ in friction.taken])
     moments = moments_of(regressor, candidates, friction.taken)
     gains = choose_drive_gains(
@@ -301,7 +339,13 @@ def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, prog
     looked_at = passes
     if is_long(whole):
         passes = Passes(
-            robot, whole, band, delays=delay.seconds, blocks=settings.blocks, threads=settings.threads
+            robot,
+            whole,
+            band,
+            delays=delay.seconds,
+            blocks=settings.blocks,
+            threads=settings.threads,
+            mapped=mapped,
         ).like(passes)
         moments = passes.moments(regressor)
         work.append(passes)
@@ -320,10 +364,15 @@ def _choose(robot: Robot, recordings: Sequence[Source], settings: Settings, prog
 
 
 def _gather(
-    robot: Robot, recordings: Sequence[Source], band: BandChoice, settings: Settings, delays: Array | None = None
+    robot: Robot,
+    recordings: Sequence[Source],
+    band: BandChoice,
+    settings: Settings,
+    delays: Array | None = None,
+    uses: Mapping[int, JointUse] | None = None,
 ) -> tuple[Passes, Candidates]:
     passes = Passes(robot, recordings, band, delays=delays, blocks=settings.blocks, threads=settings.threads)
-    return passes, gather_candidates(passes, settings)
+    return passes, gather_candidates(passes, settings, uses)
 
 
 class _Clock:

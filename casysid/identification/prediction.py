@@ -7,7 +7,7 @@ alone, away from the ends of stretches of time; and compared once more as they a
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
+from casysid.identification.order import as_given
 from casysid.signals import BandAverage, Motion
 from casysid.threads import single_threaded
 
@@ -43,6 +44,13 @@ class TorqueError:
     measured: tuple[Array, ...]
     predictions: tuple[Array, ...]
 
+    def as_given(self, places: Sequence[int]) -> TorqueError:
+        """With the curves of sorted recordings, one of each, in the order in which the recordings were given."""
+        times, measured, predictions = (
+            as_given(curves, places) for curves in (self.times, self.measured, self.predictions)
+        )
+        return replace(self, times=times, measured=measured, predictions=predictions)
+
 
 @single_threaded()
 def torque_error(
@@ -57,62 +65,90 @@ def torque_errors(
     regressor: Regressor, parameters: Sequence[Array], motions: Iterable[Motion], cutoff: float | None
 ) -> tuple[TorqueError, ...]:
     """The same of several parameter vectors, in one pass over the motions."""
-    tables = [_Table() for _ in parameters]
-    for motion in motions:
+    return tuple(sums.error() for sums in error_sums(regressor, parameters, motions, cutoff))
+
+
+def error_sums(
+    regressor: Regressor,
+    parameters: Sequence[Array],
+    motions: Iterable[Motion],
+    cutoff: float | None,
+    *,
+    curves: int | None = None,
+) -> list[ErrorSums]:
+    """What :func:`torque_errors` are made of.
+
+    Args:
+        regressor: Predicts.
+        parameters: Several vectors, shape (p,) each.
+        motions: What is predicted.
+        cutoff: Of the averages [Hz].
+        curves: Of so many motions the times, the measured and the predicted torque are kept; None for all.
+    """
+    tables = [ErrorSums() for _ in parameters]
+    for place, motion in enumerate(motions):
         inner = motion.settled if motion.settled.any() else np.ones(len(motion), dtype=bool)
         weights = averages_of(motion, cutoff)
         for table, theta in zip(tables, parameters, strict=True):
             predicted = regressor.predict(theta, motion.q, motion.v, motion.a, time=motion.time)
-            table.add(motion, predicted, inner, weights)
-    return tuple(table.error() for table in tables)
+            table.add(motion, predicted, inner, weights, curves=curves is None or place < curves)
+    return tables
 
 
-class _Table:
-    """Sums over all samples, and the averages, of one parameter vector."""
+class ErrorSums:
+    """Sums over all samples, and the averages, of one parameter vector; those of several recordings add."""
 
     def __init__(self) -> None:
         self._missed = self._felt = 0.0
-        self._samples = 0
+        self._samples = self._averages = 0
+        self._residual: Array | float = 0.0
+        self._size: Array | float = 0.0
         self._times, self._measured, self._predictions = list[Array](), list[Array](), list[Array]()
 
-    def add(self, motion: Motion, predicted: Array, inner: npt.NDArray[np.bool_], weights: Any) -> None:
-        """One motion."""
+    def add(
+        self, motion: Motion, predicted: Array, inner: npt.NDArray[np.bool_], weights: Any, *, curves: bool = True
+    ) -> None:
+        """One motion, its curves kept or not."""
         self._samples += len(motion)
         self._missed += float(np.sum((motion.tau - predicted)[inner] ** 2))
         self._felt += float(np.sum(motion.tau[inner] ** 2))
-        for kept, values in (
-            (self._times, motion.time),
-            (self._measured, motion.tau),
-            (self._predictions, predicted),
-        ):
-            kept.append(frozen(values[inner] if weights is None else weights @ values[inner]))
+        time, measured, guess = (
+            frozen(values[inner] if weights is None else weights @ values[inner])
+            for values in (motion.time, motion.tau, predicted)
+        )
+        self._averages += len(time)
+        self._residual = self._residual + np.sum((measured - guess) ** 2, axis=0)
+        self._size = self._size + np.sum(measured**2, axis=0)
+        if curves:
+            self._times.append(time)
+            self._measured.append(measured)
+            self._predictions.append(guess)
+
+    def join(self, other: ErrorSums) -> None:
+        """Those of further recordings."""
+        self._missed += other._missed
+        self._felt += other._felt
+        self._samples += other._samples
+        self._averages += other._averages
+        self._residual = self._residual + other._residual
+        self._size = self._size + other._size
+        self._times += other._times
+        self._measured += other._measured
+        self._predictions += other._predictions
 
     def error(self) -> TorqueError:
         """What came together."""
-        return _error(self._samples, self._missed, self._felt, self._times, self._measured, self._predictions)
-
-
-def _error(
-    samples: int,
-    missed: float,
-    felt: float,
-    times: Sequence[Array],
-    measured: Sequence[Array],
-    predictions: Sequence[Array],
-) -> TorqueError:
-    difference = np.concatenate(measured) - np.concatenate(predictions)
-    residual = np.linalg.norm(difference, axis=0)
-    size = np.linalg.norm(np.concatenate(measured), axis=0)
-    return TorqueError(
-        samples=samples,
-        relative=_ratio(np.linalg.norm(residual), np.linalg.norm(size)),
-        relative_unfiltered=_ratio(np.sqrt(missed), np.sqrt(felt)),
-        rmse=frozen(residual / np.sqrt(max(len(difference), 1))),
-        relative_by_joint=frozen([_ratio(e, s) for e, s in zip(residual, size, strict=True)]),
-        times=tuple(times),
-        measured=tuple(measured),
-        predictions=tuple(predictions),
-    )
+        residual, size = np.sqrt(np.atleast_1d(self._residual)), np.sqrt(np.atleast_1d(self._size))
+        return TorqueError(
+            samples=self._samples,
+            relative=_ratio(np.linalg.norm(residual), np.linalg.norm(size)),
+            relative_unfiltered=_ratio(np.sqrt(self._missed), np.sqrt(self._felt)),
+            rmse=frozen(residual / np.sqrt(max(self._averages, 1))),
+            relative_by_joint=frozen([_ratio(e, s) for e, s in zip(residual, size, strict=True)]),
+            times=tuple(self._times),
+            measured=tuple(self._measured),
+            predictions=tuple(self._predictions),
+        )
 
 
 def averages_of(motion: Motion, cutoff: float | None) -> Any:

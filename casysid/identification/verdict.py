@@ -105,7 +105,7 @@ def _remarks(result: IdentificationResult) -> list[str]:
 
 def _far_off_unseen(result: IdentificationResult) -> list[str]:
     """Links whose mass no torque tells by itself, and is several times or a fraction of the file's."""
-    file = result.robot.inertial_parameters.reshape(-1, 10)[:, 0]
+    file = result.regressor.robot.inertial_parameters.reshape(-1, 10)[:, 0]
     return [
         f"{link.name} {link.mass:.3g} kg (file {mass:.3g} kg)"
         for link, mass in zip(result.links(), file, strict=True)

@@ -4,7 +4,7 @@ IPOPT minimises over virtual parameters, in which every real vector is consisten
 consistent parameters is convex: Clarabel finds its global optimum, which certifies IPOPT's answer or takes its place.
 """
 
-from casysid.projection.api import constrained_least_squares, convex_least_squares, possible_parameters, project
+from casysid.projection.api import constrained_least_squares, convex_least_squares, project
 from casysid.projection.knowledge import (
     KeptLink,
     Knowledge,
@@ -15,6 +15,7 @@ from casysid.projection.knowledge import (
     total_mass,
 )
 from casysid.projection.layout import ParameterLike
+from casysid.projection.possible import PossibleParameters
 from casysid.projection.problem import FLOOR, PRIOR_BUDGET, ProjectionProblem, build_projection
 from casysid.projection.results import ProjectionResult, ProjectionStatus, Solver
 from casysid.projection.sampling import project_samples
@@ -26,6 +27,7 @@ __all__ = [
     "Knowledge",
     "LinearKnowledge",
     "ParameterLike",
+    "PossibleParameters",
     "ProjectionProblem",
     "ProjectionResult",
     "ProjectionStatus",
@@ -36,7 +38,6 @@ __all__ = [
     "convex_least_squares",
     "link_mass",
     "parameter_within",
-    "possible_parameters",
     "project",
     "project_samples",
     "total_mass",

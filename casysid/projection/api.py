@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import numpy.typing as npt
 
@@ -11,7 +9,7 @@ from casysid.arrays import Array
 from casysid.errors import ParameterError, SolverError
 from casysid.moments import NormalEquations
 from casysid.nlp import Progress
-from casysid.projection.certificate import USUAL_WEIGHT, certify, rough_answer
+from casysid.projection.certificate import USUAL_WEIGHT, certify
 from casysid.projection.layout import as_vector
 from casysid.projection.misfit import misfit_of_equations, misfit_of_estimate
 from casysid.projection.problem import ProjectionProblem
@@ -91,30 +89,3 @@ def convex_least_squares(
     if certificate is None:
         raise SolverError("projection: the convex solver found no consistent parameters; look at the moments")
     return np.asarray(task.frame.transform @ certificate.scaled)
-
-
-def possible_parameters(
-    problem: ProjectionProblem, prior: npt.ArrayLike | None = None
-) -> Callable[[Array, Array, float], Array]:
-    """A function that gives the consistent parameters nearest to some, ``(θ, G, residual energy) -> θ``.
-
-    By the convex solver alone, for searches that project often; where that has no answer, parameters stay as they are.
-
-    Args:
-        problem: From :func:`build_projection`.
-        prior: As for :func:`project`.
-    """
-
-    @single_threaded()
-    def nearest(estimate: Array, metric: Array, residual_energy: float) -> Array:
-        task = task_of(problem, misfit_of_estimate(metric, estimate, residual_energy), prior)
-        try:
-            certificate = certify(task, USUAL_WEIGHT)
-        except SolverError:
-            certificate = None
-        if certificate is not None:
-            return np.asarray(task.frame.transform @ certificate.scaled)
-        rough = rough_answer(task)
-        return estimate if rough is None else np.asarray(task.frame.transform @ rough)
-
-    return nearest

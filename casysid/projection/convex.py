@@ -37,16 +37,21 @@ class Cone:
         offset: ``b``, shape (rows,).
         equalities: Rows that have to be zero; they come first.
         inequalities: Rows that must not be negative; they follow.
-        bodies: Number of links whose matrix must be positive semidefinite; their triangles follow.
-        order: Rows of that matrix.
+        bodies: Links whose matrix must be positive semidefinite, shape (b,); their triangles follow.
+        consistency: What is asked of them.
     """
 
     matrix: Any
     offset: Array
     equalities: int
     inequalities: int
-    bodies: int
-    order: int
+    bodies: npt.NDArray[np.intp]
+    consistency: Consistency
+
+    @property
+    def order(self) -> int:
+        """Rows of a link's matrix."""
+        return len(CONSISTENCY_BASIS[self.consistency][0])
 
     def contains(self, scaled: Array, tolerance: float = 1e-9) -> bool:
         """Whether ``φ``, shape (p,), is feasible."""
@@ -60,20 +65,18 @@ class Cone:
         """What must be positive semidefinite at ``φ``, lower triangles, shape (bodies, order, order)."""
         linear = self.equalities + self.inequalities
         column, row = np.tril_indices(self.order)
-        triangles = (self.offset[linear:] - self.matrix[linear:] @ scaled).reshape(self.bodies, len(row))
-        matrices = np.zeros((self.bodies, self.order, self.order))
+        triangles = (self.offset[linear:] - self.matrix[linear:] @ scaled).reshape(len(self.bodies), len(row))
+        matrices = np.zeros((len(self.bodies), self.order, self.order))
         matrices[:, column, row] = triangles / np.where(row == column, 1.0, np.sqrt(2.0))
         return matrices
 
     def gradients(self, body: npt.NDArray[np.intp], v: Array) -> Array:
         """Derivatives by ``φ`` of ``vᵀ M v``, ``M`` a body's matrix, shape (k, p), for ``v`` of shape (k, order)."""
-        column, row = np.tril_indices(self.order)
-        weights = v[:, column] * v[:, row] * np.where(row == column, 1.0, np.sqrt(2.0))
-        linear, entries = self.equalities + self.inequalities, len(row)
-        places = linear + body[:, None] * entries + np.arange(entries)
-        rows = np.repeat(np.arange(len(body)), entries)
-        pick = sparse.csr_matrix((weights.ravel(), (rows, places.ravel())), shape=(len(body), self.matrix.shape[0]))
-        return np.asarray(-(pick @ self.matrix).toarray())
+        rows = np.zeros((len(body), self.matrix.shape[1]))
+        own = 10 * self.bodies[body, None] + np.arange(10)
+        basis = CONSISTENCY_BASIS[self.consistency]
+        rows[np.arange(len(body))[:, None], own] = np.einsum("ki,mij,kj->km", v, basis, v, optimize=True)
+        return rows
 
 
 def cone_of(layout: Layout, constraints: Constraints, frame: Frame, consistency: Consistency, floor: float) -> Cone:
@@ -107,8 +110,8 @@ def cone_of(layout: Layout, constraints: Constraints, frame: Frame, consistency:
         frozen(offset),
         int(constraints.kept.sum() + same.sum()),
         int(below.sum() + above.sum() + len(single)),
-        len(free),
-        CONSISTENCY_BASIS[consistency].shape[1],
+        free,
+        consistency,
     )
 
 
@@ -154,7 +157,7 @@ def solve_convex(objective: Objective, cone: Cone, reference: Array) -> ConvexOp
     settings.equilibrate_enable = False  # the frame has done it, and better
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
     kinds = [clarabel.ZeroConeT(p + cone.equalities), clarabel.NonnegativeConeT(cone.inequalities)]
-    kinds += [clarabel.PSDTriangleConeT(cone.order)] * cone.bodies
+    kinds += [clarabel.PSDTriangleConeT(cone.order)] * len(cone.bodies)
     quadratic = sparse.diags(np.repeat([0.0, 2.0 * SCALE], p), format="csc")
     rows = sparse.bmat([[sparse.csc_matrix(objective.factor), -sparse.eye(p)], [cone.matrix, None]], format="csc")
     offset = np.concatenate([objective.target - objective.factor @ reference, cone.offset - cone.matrix @ reference])

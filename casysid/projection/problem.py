@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from casysid.errors import ParameterError
 from casysid.inertia import Consistency
@@ -28,7 +29,6 @@ class ProjectionProblem:
         consistency: What is asked of every link.
         floor: No link keeps less than this fraction of its reference (nearly the prior's) pseudo-inertia.
         prior_budget: What staying close to the prior may cost the data, as a fraction of the residual energy.
-        program: What IPOPT solves.
     """
 
     layout: Layout
@@ -36,7 +36,11 @@ class ProjectionProblem:
     consistency: Consistency
     floor: float
     prior_budget: float
-    program: ProjectionProgram
+
+    @cached_property
+    def program(self) -> ProjectionProgram:
+        """What IPOPT solves, built when it is first asked for: searches do without."""
+        return build_program(self.layout, self.constraints, self.consistency, self.floor)
 
 
 @single_threaded()
@@ -73,5 +77,4 @@ def build_projection(
         consistency=consistency,
         floor=floor,
         prior_budget=prior_budget,
-        program=build_program(layout, constraints, consistency, floor),
     )

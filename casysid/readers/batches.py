@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
 from casysid.arrays import Array
 
+Batch = dict[str, np.ndarray[Any, Any]]
+"""Columns by name, of equally many rows: doubles, and whole numbers that a double does not hold."""
 
-def from_row(batches: Iterable[dict[str, Array]], first: int) -> Iterator[dict[str, Array]]:
+
+def from_row(batches: Iterable[Batch], first: int) -> Iterator[Batch]:
     """Batches without the rows before ``first``."""
     for columns in batches:
         rows = len(next(iter(columns.values())))
@@ -18,7 +22,7 @@ def from_row(batches: Iterable[dict[str, Array]], first: int) -> Iterator[dict[s
         first = max(first - rows, 0)
 
 
-def all_rows(names: Sequence[str], batches: Iterable[dict[str, Array]]) -> dict[str, Array]:
+def all_rows(names: Sequence[str], batches: Iterable[Batch]) -> dict[str, Array]:
     """Consecutive batches of the named columns as one."""
     parts = list(batches)
     return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in names}

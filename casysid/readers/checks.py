@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import RecordingError
-from casysid.readers.columns import Layout, listing
+from casysid.readers.columns import Layout
+from casysid.readers.messages import listing
+from casysid.readers.repairs import LARGEST, ROW
 from casysid.readers.statistics import FASTEST, Statistics
-from casysid.readers.table import Table
 from casysid.robot import JointKind, Robot
 
 FEWEST = 20
 """Fewer rows than this are no recording."""
-LARGEST = 1e9
-"""Of any value but time, in SI units: a wind turbine's shaft carries 1e7 N m, a spindle at FASTEST turns 1e9 rad in
-three hours."""
 LONGEST = 1e9
 """From the first sample to the last [s]: thirty years."""
 
@@ -25,8 +23,8 @@ LONGEST = 1e9
 class SampleChecks:
     """Refuses samples that are too few, not finite, not in time order, or all the same, once all batches were seen."""
 
-    def __init__(self, table: Table, layout: Layout, source: str) -> None:
-        self._table, self._layout, self._source = table, layout, source
+    def __init__(self, place: Callable[[int], str], layout: Layout, source: str) -> None:
+        self._place, self._layout, self._source = place, layout, source
         self._samples = 0
         self._bad: dict[str, tuple[int, int, float]] = {}
         self._far: dict[str, tuple[int, int, float]] = {}
@@ -47,42 +45,44 @@ class SampleChecks:
         rows = len(columns[self._layout.torque[0]])
         if not rows:
             return
-        for name, values in columns.items():
-            self._add_finite(name, values)
-        if self._layout.time is not None:
-            self._add_order(columns[self._layout.time])
+        places = columns[ROW]
         for name in self._layout.used:
-            if name != self._layout.time:
-                self._add_magnitude(name, columns[name])
+            if name in columns:
+                self._add_finite(name, columns[name], places)
+        if self._layout.time is not None:
+            self._add_order(columns[self._layout.time], places)
+        for name in self._layout.used:
+            if name != self._layout.time and name in columns:
+                self._add_magnitude(name, columns[name], places)
         for name in (*self._layout.position, *self._layout.torque):
             self._low[name] = min(self._low.get(name, np.inf), float(columns[name].min()))
             self._high[name] = max(self._high.get(name, -np.inf), float(columns[name].max()))
         self._samples += rows
 
-    def _add_finite(self, name: str, values: Array) -> None:
+    def _add_finite(self, name: str, values: Array, places: Array) -> None:
         finite = np.isfinite(values)
         if not finite.all():
             first = int(np.argmin(finite))
-            count, row, value = self._bad.get(name, (0, self._samples + first, float(values[first])))
+            count, row, value = self._bad.get(name, (0, int(places[first]), float(values[first])))
             self._bad[name] = (count + int(np.count_nonzero(~finite)), row, value)
 
-    def _add_magnitude(self, name: str, values: Array) -> None:
+    def _add_magnitude(self, name: str, values: Array, places: Array) -> None:
         if max(values.max(), -values.min()) > LARGEST:
             far = np.flatnonzero(np.abs(values) > LARGEST)
             first = int(far[0])
-            count, row, value = self._far.get(name, (0, self._samples + first, float(values[first])))
+            count, row, value = self._far.get(name, (0, int(places[first]), float(values[first])))
             self._far[name] = (count + len(far), row, value)
 
-    def _add_order(self, time: Array) -> None:
+    def _add_order(self, time: Array, places: Array) -> None:
         joined = np.concatenate([self._last_time, time])
-        steps, offset = np.diff(joined), self._samples - len(self._last_time)
+        steps, skip = np.diff(joined), 1 - len(self._last_time)
         back, same = steps < 0.0, steps == 0.0
         if back.any() and self._first_back is None:
             k = int(np.argmax(back))
-            self._first_back = (offset + k + 1, float(joined[k]), float(joined[k + 1]))
+            self._first_back = (int(places[k + skip]), float(joined[k]), float(joined[k + 1]))
         if same.any() and self._first_same is None:
             k = int(np.argmax(same))
-            self._first_same = (offset + k + 1, float(joined[k + 1]))
+            self._first_same = (int(places[k + skip]), float(joined[k + 1]))
         self._back += int(np.count_nonzero(back))
         self._same += int(np.count_nonzero(same))
         self._last_time = time[-1:]
@@ -124,7 +124,7 @@ class SampleChecks:
             counts = listing([f"'{name}' in {count} rows" for name, (count, _, _) in bad.items()], 6)
             raise RecordingError(
                 f"{self._source}: values that are not finite numbers: {counts}; "
-                f"'{name}' is {kind} in {self._table.place(row)} first. Cut those rows at the source; "
+                f"'{name}' is {kind} in {self._place(row)} first. Cut those rows at the source; "
                 "none is dropped or filled in silently"
             )
 
@@ -132,7 +132,7 @@ class SampleChecks:
         """A value that no machine has: a glitch, an overflow, or another unit."""
         for name, (count, row, value) in self._far.items():
             raise RecordingError(
-                f"{self._source}: '{name}' is {value:.6g} in {self._table.place(row)}, beyond {LARGEST:g}, "
+                f"{self._source}: '{name}' is {value:.6g} in {self._place(row)}, beyond {LARGEST:g}, "
                 f"which no machine reaches in SI units ({count} rows); cut out the glitch, or convert the column"
             )
 
@@ -141,18 +141,18 @@ class SampleChecks:
         if self._first_back is not None:
             row, before, after = self._first_back
             raise RecordingError(
-                f"{self._source}: '{name}' runs backwards {self._back} times, first in {self._table.place(row)} "
-                f"({before:.9g} then {after:.9g}); sort the rows, or give joined logs as separate files"
+                f"{self._source}: '{name}' runs backwards {self._back} times, first in {self._place(row)} "
+                f"({before!r} then {after!r}); sort the rows, or give joined logs as separate files"
             )
         if self._first_same is not None:
             row, at = self._first_same
             raise RecordingError(
                 f"{self._source}: '{name}' repeats the stamp before it in {self._same} rows, first in "
-                f"{self._table.place(row)} ({at:.9g}); remove the repeated rows, or write time with more digits"
+                f"{self._place(row)} ({at!r}); remove the repeated rows, or write time with more digits"
             )
 
 
-def check_steps(table: Table, layout: Layout, statistics: Statistics) -> None:
+def check_steps(place: Callable[[int], str], layout: Layout, statistics: Statistics) -> None:
     """Refuse a position that leaps faster than any joint can move, and time that spans more than a life's work.
 
     Raises:
@@ -163,8 +163,8 @@ def check_steps(table: Table, layout: Layout, statistics: Statistics) -> None:
     if span > LONGEST and len(gaps):
         largest = int(np.argmax(gaps[:, 1] - gaps[:, 0]))
         raise RecordingError(
-            f"{label}: time spans {span:.3g} s, its largest step before {table.place(int(rows[largest]))} "
-            f"({gaps[largest, 0]:.9g} then {gaps[largest, 1]:.9g}); wanted seconds of one recording, at most "
+            f"{label}: time spans {span:.3g} s, its largest step before {place(int(rows[largest]))} "
+            f"({float(gaps[largest, 0])!r} then {float(gaps[largest, 1])!r}); wanted seconds of one recording, at most "
             f"{LONGEST:g}"
         )
     leaps = statistics.positions(unwrapped=True)
@@ -172,7 +172,7 @@ def check_steps(table: Table, layout: Layout, statistics: Statistics) -> None:
         row, before, after, step = leaps.first_leap[k]
         raise RecordingError(
             f"{label}: '{layout.position[k]}' leaps from {before:.6g} to {after:.6g} in {step:.3g} s "
-            f"before {table.place(int(row))}, faster than {FASTEST:g} a second, which no joint is ({leaps.leaps[k]} "
+            f"before {place(int(row))}, faster than {FASTEST:g} a second, which no joint is ({leaps.leaps[k]} "
             "steps); cut out the glitch, or check the units of q and time"
         )
 

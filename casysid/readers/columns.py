@@ -1,8 +1,8 @@
 """Which column of a log is which channel of the robot.
 
-A file names its columns by joint (``q_elbow, tau_elbow``) or numbers them in the model's order, from 1 or from 0
-(``q1, dq1, ddq1, tau1``; ``q_1`` too, and plain ``q`` for a single one), never both. Of the spellings below the first
-that the file has counts, and the others are left aside.
+By joint (``q_elbow, tau_elbow``) or numbered in the model's order, from 1 or from 0 (``q1, dq1, ddq1, tau1``; ``q_1``
+too, and plain ``q`` for a single one), never both. Of these spellings the first that the file has counts, and the
+others are left aside.
 
 ============ ============================== ==========================
 quantity     by name, ``<spelling>_<name>`` by number, ``<spelling>1``
@@ -14,52 +14,40 @@ acceleration a, ddq, qdd, acceleration      ddq, a, qdd, acceleration
 torque       tau, effort, torque            tau, effort, torque
 ============ ============================== ==========================
 
-Names are position channels for q and degrees of freedom for the rest: the joint's name when it moves in one way.
+Where there are none of these, the names are read word by word (:mod:`casysid.readers.words`): groups of columns that
+differ in the joint alone, or in one number alone, and whose other words name a quantity. A measured group is preferred
+to a commanded one; between two that are alike none is chosen. Names are position channels for q and degrees of freedom
+for the rest: the joint's name when it moves in one way.
 """
 
 from __future__ import annotations
 
-import difflib
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import product
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NoReturn
 
 from casysid.errors import RecordingError
+from casysid.readers.candidates import (
+    ACCELERATION,
+    POSITION,
+    QUANTITIES,
+    TORQUE,
+    VELOCITY,
+    Candidate,
+    Labels,
+    Quantity,
+    read_names,
+    usual_by_name,
+    usual_by_number,
+)
+from casysid.readers.choosing import choose_pair, choose_rest, only_commanded
+from casysid.readers.clock import Clock, find_clock
+from casysid.readers.messages import listing
+from casysid.readers.refusals import current_not_torque, lacking, mixed, no_clock, same_number, wrong_count
+from casysid.readers.scaling import factors_of
+from casysid.recording.declared import NOTHING, Declared
 
-TIME = ("time", "Time", "t", "timestamp")
-MOST_COLUMNS = 10_000
-"""A table with more is no recording: 1000 joints (the most of any model here) of 10 quantities each."""
-LONGEST_NAME = 80
-"""Letters of a column's name that a message shows."""
-MOST_COMPARED = 1000
-"""Columns among which a misspelled one is looked for."""
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A measured quantity and how its columns may be spelled.
-
-    Attributes:
-        word: What it is called.
-        named: Spellings before the name of a channel.
-        numbered: Spellings before a number.
-    """
-
-    word: str
-    named: tuple[str, ...]
-    numbered: tuple[str, ...]
-
-    @property
-    def usual(self) -> Quantity:
-        """With the first spellings alone."""
-        return Quantity(self.word, self.named[:1], self.numbered[:1])
-
-
-POSITION = Quantity("position", ("q", "position", "pos"), ("q", "position", "pos"))
-VELOCITY = Quantity("velocity", ("v", "dq", "qd", "velocity"), ("dq", "v", "qd", "velocity"))
-ACCELERATION = Quantity("acceleration", ("a", "ddq", "qdd", "acceleration"), ("ddq", "a", "qdd", "acceleration"))
-TORQUE = Quantity("torque", ("tau", "effort", "torque"), ("tau", "effort", "torque"))
+__all__ = ["Labels", "Layout", "match_columns"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,165 +55,221 @@ class Layout:
     """The columns that a recording is made of, each in the robot's order.
 
     Attributes:
-        time: Column of time stamps; None for unordered samples.
+        clock: Columns of time stamps; None for unordered samples.
         position: By channel.
         velocity: By degree of freedom; None when not logged.
         acceleration: By degree of freedom; None when not logged.
         torque: By degree of freedom.
+        factors: By which columns are multiplied to be in SI units at the joint; the others by one.
+        remarks: What to say of the choice.
+        unmeasured: Columns of torque that hold nothing; zeros stand for them.
     """
 
-    time: str | None
+    clock: Clock | None
     position: tuple[str, ...]
     velocity: tuple[str, ...] | None
     acceleration: tuple[str, ...] | None
     torque: tuple[str, ...]
+    factors: Mapping[str, float] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+    unmeasured: tuple[str, ...] = ()
+
+    @property
+    def time(self) -> str | None:
+        """The column of time stamps, the first if there are two; None for unordered samples."""
+        return None if self.clock is None else self.clock.columns[0]
 
     @property
     def used(self) -> tuple[str, ...]:
-        """All of them."""
-        return (
-            *(() if self.time is None else (self.time,)),
-            *self.position,
-            *(self.velocity or ()),
-            *(self.acceleration or ()),
-            *self.torque,
-        )
+        """All columns, each once."""
+        clock = () if self.clock is None else self.clock.columns
+        motion = (*self.position, *(self.velocity or ()), *(self.acceleration or ()))
+        return tuple(dict.fromkeys((*clock, *motion, *self.torque)))
 
 
-def match_columns(found: Sequence[str], channels: Sequence[str], dofs: Sequence[str], source: str) -> Layout:
+@dataclass(frozen=True)
+class _Names:
+    """The names of a log beside those of the robot."""
+
+    found: Sequence[str]
+    channels: Sequence[str]
+    dofs: Sequence[str]
+    source: str
+    labels: Labels
+
+    def of(self, quantity: Quantity) -> Sequence[str]:
+        """Joints that have the quantity."""
+        return self.channels if quantity is POSITION else self.dofs
+
+    def by_name(self) -> list[Candidate]:
+        """Groups of the usual spellings by joint."""
+        return [one for quantity in QUANTITIES for one in usual_by_name(quantity, self.found, self.of(quantity))]
+
+    def by_number(self) -> list[Candidate]:
+        """Groups of the usual spellings by number."""
+        return [
+            one
+            for quantity in QUANTITIES
+            for one in usual_by_number(quantity, self.found, len(self.of(quantity)), self.source)
+        ]
+
+
+def match_columns(
+    found: Sequence[str],
+    channels: Sequence[str],
+    dofs: Sequence[str],
+    source: str,
+    labels: Labels | None = None,
+    declared: Declared = NOTHING,
+    linear: Collection[str] = (),
+) -> Layout:
     """The layout of a file with the columns ``found``, for a robot with these channels and degrees of freedom.
 
+    Args:
+        found: Names of the columns.
+        channels: Of the robot's positions.
+        dofs: Of the robot.
+        source: What to call the log in a message.
+        labels: What the log says of its columns beside their names.
+        declared: What its user says; no columns.
+        linear: Channels and degrees of freedom that are lengths.
+
     Raises:
-        RecordingError: If a wanted column is missing, there twice or once too often, or names and numbers are mixed.
+        RecordingError: If a wanted column is missing, there twice or once too often, names and numbers are mixed, two
+            choices are alike, or there are currents only.
     """
-    named = _by_name(POSITION, found, channels, source)
-    position = named or _by_number(POSITION, found, channels, source)
-    if position is None:
-        raise _lacking(POSITION, [f"q_{name}" for name in channels], found, source)
-    if named and all(f"q{k + 1}" in set(found) - set(named) for k in range(len(channels))):
-        raise _mixed(source, named[0], "q1")
-    optional = (VELOCITY, ACCELERATION)
-    find, other = (_by_name, _by_number) if named else (_by_number, _by_name)
-    velocity, acceleration, torque = (find(quantity, found, dofs, source) for quantity in (*optional, TORQUE))
-    for quantity, columns in zip((*optional, TORQUE), (velocity, acceleration, torque), strict=True):
-        stray = None if columns else other(quantity.usual if quantity in optional else quantity, found, dofs, source)
-        if stray:
-            raise _mixed(source, position[0], stray[0])
-    if torque is None:
-        wanted = [f"tau_{name}" for name in dofs] if named else [f"tau{k + 1}" for k in range(len(dofs))]
-        raise _lacking(TORQUE, wanted, found, source)
-    time = next((name for name in TIME if name in found), None)
-    layout = Layout(time=time, position=position, velocity=velocity, acceleration=acceleration, torque=torque)
-    _refuse_unusable(layout, found, source)
+    names = _Names(found, channels, dofs, source, labels or Labels())
+    groups = _groups(names, declared)
+    by_quantity = {word: [one for one in groups if one.quantity == word] for word in _WORDS}
+    if declared.motor_constant is not None or declared.units.get("torque"):
+        _take_currents(by_quantity, declared)
+    if not by_quantity["torque"]:
+        _refuse_no_torque(names, by_quantity, named=groups[0].named)
+    position, torque = choose_pair(by_quantity["position"], by_quantity["torque"], source)
+    if position.named:
+        _refuse_mixed(names, position)
+    velocity = choose_rest(by_quantity["velocity"], position)
+    acceleration = choose_rest(by_quantity["acceleration"], position)
+    for quantity, chosen in ((VELOCITY, velocity), (ACCELERATION, acceleration)):
+        if chosen is None:
+            _refuse_half(names, quantity, named=position.named)
+    picked = [one for one in (position, velocity, acceleration, torque) if one is not None]
+    for one in picked:
+        if one.doubled:
+            raise same_number(one.quantity, one.doubled[0], one.columns, source)
+    layout = Layout(
+        clock=find_clock(found, names.labels.units, position.columns[0]),
+        position=position.columns,
+        velocity=None if velocity is None else velocity.columns,
+        acceleration=None if acceleration is None else acceleration.columns,
+        torque=torque.columns,
+        factors=factors_of(picked, channels, dofs, names.labels, declared, set(linear), source),
+        remarks=only_commanded(picked),
+    )
+    refuse_unusable(layout, found, source)
     return layout
 
 
-def _by_name(quantity: Quantity, found: Sequence[str], names: Sequence[str], source: str) -> tuple[str, ...] | None:
-    for spelling in quantity.named:
-        wanted = [f"{spelling}_{name}" for name in names]
-        present = [name in found for name in wanted]
-        if all(present):
-            return tuple(wanted)
-        if any(present):
-            raise _lacking(quantity, wanted, found, source)
-    return None
+_WORDS = ("position", "velocity", "acceleration", "torque", "current")
 
 
-def _by_number(quantity: Quantity, found: Sequence[str], names: Sequence[str], source: str) -> tuple[str, ...] | None:
-    for spelling, mark in product(quantity.numbered, ("", "_")):
-        pattern = re.compile(rf"{spelling}{mark}([0-9]{{1,9}})")
-        numbered = [(int(m[1]), name) for name in found if (m := pattern.fullmatch(name))]
-        hits = dict(numbered)
-        _refuse_same_number(quantity, numbered, hits, source)
-        hits = hits or ({1: spelling} if spelling in found else {})
-        if hits:
-            return _in_order(quantity, hits, names, source)
-    return None
+def _groups(names: _Names, declared: Declared) -> list[Candidate]:
+    """Complete groups of columns, by joint if the positions are; else numbered."""
+    named = names.by_name()
+    complete = [one for one in named if not one.lacking]
+    read = read_names(names.found, names.channels, names.dofs, names.labels)
+    read = [one for one in read if one.columns not in {usual.columns for usual in named}]
+    complete += [one for one in read if one.named and not one.lacking]
+    if any(one.quantity == "position" for one in complete):
+        return _positions_first(complete)
+    partial = [one for one in (*named, *read) if one.quantity == "position" and one.named and one.columns]
+    if any(one.usual is not None for one in partial):
+        raise _lacking(names, POSITION, partial, named=True)
+    numbered = names.by_number()
+    usual = {one.columns for one in numbered}
+    others = [one for one in read if not one.named and one.columns not in usual]
+    complete = [one for one in (*numbered, *others) if not one.lacking]
+    if any(one.quantity == "position" for one in complete):
+        return _positions_first(complete)
+    short = [one for one in (*numbered, *others) if one.quantity == "position"]
+    if short and not partial:
+        raise wrong_count(POSITION, max(short, key=lambda one: len(one.columns)), names.channels, names.source)
+    raise _lacking(names, POSITION, partial, named=True)
 
 
-def _refuse_same_number(
-    quantity: Quantity, numbered: Sequence[tuple[int, str]], hits: Mapping[int, str], source: str
-) -> None:
-    for number, name in numbered:
-        if name != hits[number]:
-            raise RecordingError(
-                f"{source}: columns '{name}' and '{hits[number]}' are both number {number} of {quantity.word}; "
-                "rename or remove one of them"
-            )
+def _positions_first(groups: Sequence[Candidate]) -> list[Candidate]:
+    return sorted(groups, key=lambda one: one.quantity != "position")
 
 
-def _in_order(quantity: Quantity, hits: dict[int, str], names: Sequence[str], source: str) -> tuple[str, ...]:
-    columns = tuple(hits[k] for k in sorted(hits))
-    if sorted(hits) in (list(range(1, len(names) + 1)), list(range(len(names)))):
-        return columns
-    transposed = "; in a matrix rows are samples, so transpose it" if len(columns) > 10 * len(names) else ""
-    raise RecordingError(
-        f"{source}: {len(columns)} numbered columns of {quantity.word} ({listing(columns, 8)}), "
-        f"but the robot has {len(names)}: {listing(names)}. Numbers run from 1 in the "
-        f"model's order, none left out{transposed}; "
-        f"name the columns by joint ({quantity.named[0]}_{names[0]}) or lock the joints that the log lacks"
+def _take_currents(by_quantity: dict[str, list[Candidate]], declared: Declared) -> None:
+    """Currents stand in for torques where a motor constant is declared, or a unit of torque and no torque is there."""
+    currents = [one for one in by_quantity["current"] if not one.commanded] or by_quantity["current"]
+    if currents and (declared.motor_constant is not None or not by_quantity["torque"]):
+        by_quantity["torque"] = currents
+
+
+def _refuse_no_torque(names: _Names, by_quantity: Mapping[str, Sequence[Candidate]], *, named: bool) -> NoReturn:
+    position = by_quantity["position"][0]
+    others = names.by_number() if named else names.by_name()
+    stray = [one for one in others if one.quantity == "torque" and not one.lacking]
+    if stray:
+        raise mixed(names.source, position.columns[0], stray[0].columns[0])
+    if by_quantity["current"]:
+        raise current_not_torque(by_quantity["current"][0], names.source)
+    partial = [one for one in _of_kind(names, named=named) if one.quantity == "torque"]
+    if partial and not named:
+        raise wrong_count(TORQUE, max(partial, key=lambda one: len(one.columns)), names.dofs, names.source)
+    raise _lacking(names, TORQUE, partial, named=named)
+
+
+def _lacking(names: _Names, quantity: Quantity, partial: Sequence[Candidate], *, named: bool) -> RecordingError:
+    return lacking(quantity, names.of(quantity), names.found, partial, names.source, named=named)
+
+
+def _of_kind(names: _Names, *, named: bool) -> list[Candidate]:
+    read = read_names(names.found, names.channels, names.dofs, names.labels)
+    return [*(names.by_name() if named else names.by_number()), *(one for one in read if one.named == named)]
+
+
+def _refuse_mixed(names: _Names, position: Candidate) -> None:
+    numbers = {f"q{k + 1}" for k in range(len(names.channels))}
+    if position.usual is not None and numbers <= set(names.found) - set(position.columns):
+        raise mixed(names.source, position.columns[0], "q1")
+
+
+def _refuse_half(names: _Names, quantity: Quantity, *, named: bool) -> None:
+    """Velocities, accelerations of some joints only, or named in another way than the positions."""
+    joints = names.of(quantity)
+    own = usual_by_name(quantity, names.found, joints) if named else []
+    if own:
+        raise lacking(quantity, joints, names.found, own, names.source, named=named)
+    if not named:
+        short = usual_by_number(quantity, names.found, len(joints), names.source)
+        if short:
+            raise wrong_count(quantity, short[0], joints, names.source)
+    other = (
+        usual_by_number(quantity.usual, names.found, len(joints), names.source)
+        if named
+        else usual_by_name(quantity.usual, names.found, joints)
     )
+    if other:
+        first = f"{quantity.named[0]}_{joints[0]}" if named else f"{quantity.numbered[0]}1"
+        raise mixed(names.source, first if first in names.found else names.found[0], other[0].columns[0])
 
 
-def _refuse_unusable(layout: Layout, found: Sequence[str], source: str) -> None:
-    if layout.time is None and (layout.velocity is None or layout.acceleration is None):
-        lacking = " and ".join(w for w in ("velocity", "acceleration") if getattr(layout, w) is None)
-        near = [name for name in found if "time" in name.lower() or "stamp" in name.lower()]
-        raise RecordingError(
-            f"{source}: no column time [s]{_maybe(near)}; rows without time are unordered samples and need q, v, a and "
-            f"tau, but {lacking} is missing. Add one or the other. Found: {listing(found)}"
-        )
-    twice = sorted({name for name in layout.used if list(found).count(name) > 1})
-    if twice:
-        raise RecordingError(f"{source}: columns named twice: {listing(twice)}; rename or remove one of each")
-
-
-def _lacking(quantity: Quantity, wanted: Sequence[str], found: Sequence[str], source: str) -> RecordingError:
-    lacking = [name for name in wanted if name not in found]
-    short = [name for name in found[:MOST_COMPARED] if len(name) <= LONGEST_NAME]
-    free = [name for name in short if not _means_something(name, wanted)]
-    near = [match for name in lacking[:8] for match in difflib.get_close_matches(name, free, 1, 0.75)]
-    letter, number = quantity.named[0], quantity.numbered[0]
-    return RecordingError(
-        f"{source}: no column {listing(lacking)}{_maybe(near)}. Wanted for {quantity.word}: {listing(wanted)} "
-        f"({letter}_<name> by joint, or {number}1 to {number}{len(wanted)} in the model's order). "
-        f"Found: {listing(found)}. Rename the columns, or lock joints that were not logged"
-    )
-
-
-def _means_something(name: str, wanted: Sequence[str]) -> bool:
-    """Whether a column has its own meaning already, and so cannot be another one misspelled."""
-    prefix, _, owner = name.partition("_")
-    spellings = {spelling for quantity in (POSITION, VELOCITY, ACCELERATION, TORQUE) for spelling in quantity.named}
-    return prefix in spellings and owner in {column.partition("_")[2] for column in wanted}
-
-
-def _mixed(source: str, column: str, stray: str) -> RecordingError:
-    return RecordingError(
-        f"{source}: some columns are named by joint and some numbered ({column}, {stray}), "
-        "so joints could be confused; name them all or number them all"
-    )
-
-
-def _maybe(near: Sequence[str]) -> str:
-    return f" (did you mean {listing(sorted(set(near)))}?)" if near else ""
-
-
-def listing(names: Sequence[str], most: int = 16) -> str:
-    """Names for a message, the first ``most`` of them, long ones cut short."""
-    more = f", ... ({len(names)} in all)" if len(names) > most else ""
-    shown = (name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 3]}..." for name in names[:most])
-    return ", ".join(shown) + more
-
-
-def refuse_too_many(columns: int, source: str) -> None:
-    """Nothing, if a table of so many columns can be a recording.
+def refuse_unusable(layout: Layout, found: Sequence[str], source: str) -> None:
+    """Nothing, if the columns are there once, with time or with all that unordered samples need.
 
     Raises:
-        RecordingError: It cannot.
+        RecordingError: They are not.
     """
-    if columns > MOST_COLUMNS:
-        raise RecordingError(
-            f"{source}: {columns} columns, at most {MOST_COLUMNS} are read; rows are samples, so transpose a matrix "
-            "that has them as columns"
-        )
+    if layout.clock is None and (layout.velocity is None or layout.acceleration is None):
+        short = [word for word in ("velocity", "acceleration") if getattr(layout, word) is None]
+        raise no_clock(short, found, source)
+    counts = {name: 0 for name in layout.used}
+    for name in found:
+        if name in counts:
+            counts[name] += 1
+    twice = sorted(name for name, count in counts.items() if count > 1)
+    if twice:
+        raise RecordingError(f"{source}: columns named twice: {listing(twice)}; rename or remove one of each")

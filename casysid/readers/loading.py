@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,77 +12,75 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.errors import RecordingError
 from casysid.readers.angles import unwrap
-from casysid.readers.batches import all_rows
 from casysid.readers.checks import SampleChecks, check_quaternions, check_steps
-from casysid.readers.columns import Layout, match_columns
+from casysid.readers.columns import Layout
+from casysid.readers.faults import decided_unit, emptied, glitches_of, too_fast
+from casysid.readers.mapping import lay_out, text_of_map
+from casysid.readers.repairs import Columns, together
+from casysid.readers.samples import Samples
 from casysid.readers.statistics import Statistics
-from casysid.readers.table import Table, open_table
+from casysid.readers.survey import Survey
+from casysid.readers.table import open_table
 from casysid.readers.units import check_units
 from casysid.readers.weaknesses import find_weaknesses
+from casysid.recording.declared import NOTHING, Declared
 from casysid.recording.file import RecordingFile
 from casysid.recording.recording import Recording
-from casysid.robot import Robot
+from casysid.robot import JointKind, Robot
 from casysid.threads import single_threaded
+
+MOST_ROUNDS = 8
+"""Scans of a log: one for each kind of repair, and one more that finds nothing."""
 
 
 @single_threaded()
-def load_recording(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]]:
+def load_recording(path: Path, robot: Robot, declared: Declared = NOTHING) -> tuple[Recording, tuple[str, ...]]:
     """The recording in a file, and sentences about what is weak in it.
 
     Raises:
         RecordingError: If it cannot be used.
     """
     try:
-        return _load(path, robot)
+        return _load(path, robot, declared)
     except MemoryError as error:
         raise RecordingError(f"{path}: the recording does not fit into memory ({error}); cut it into pieces") from error
 
 
-def _load(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]]:
-    table = open_table(path)
-    layout = match_columns(table.names, robot.channels, robot.dofs, str(path))
-    parts: list[dict[str, Array]] = []
-
-    def kept() -> Iterator[dict[str, Array]]:
-        for columns in table.batches(layout.used):
-            parts.append(columns)
-            yield columns
-
-    statistics = _scan(table, layout, robot, str(path), kept())
-    columns = all_rows(layout.used, parts)
-    logged = _recording(columns, layout, robot, _about(path, table, layout))
-    wrapped = _wrapped(statistics)
-    recording = next(unwrap([logged], wrapped)) if wrapped else logged
-    return recording, find_weaknesses(statistics, robot)
+def _load(path: Path, robot: Robot, declared: Declared) -> tuple[Recording, tuple[str, ...]]:
+    parts: list[Columns] = []
+    found = _scan(path, robot, declared, parts)
+    logged = _recording(
+        together(parts), found.samples.layout, robot, {"sources": (str(path),), "unused_columns": found.unused}
+    )
+    recording = next(unwrap([logged], found.wrapped)) if found.wrapped else logged
+    return recording, found.sentences(robot)
 
 
 @single_threaded()
-def scan_recording(path: Path, robot: Robot) -> tuple[RecordingFile, tuple[str, ...]]:
+def scan_recording(path: Path, robot: Robot, declared: Declared = NOTHING) -> tuple[RecordingFile, tuple[str, ...]]:
     """The recording in a file, where it stays, and sentences about what is weak in it; reads the file once.
 
     Raises:
         RecordingError: If it cannot be used.
     """
-    table = open_table(path)
-    layout = match_columns(table.names, robot.channels, robot.dofs, str(path))
-    version = _version(path)
-    statistics = _scan(table, layout, robot, str(path), table.batches(layout.used))
-    facts = statistics.facts()
-    wrapped = _wrapped(statistics)
-    about = _about(path, table, layout)
+    version = _version(path) if path.exists() else (0, 0)
+    found = _scan(path, robot, declared, None)
+    facts = found.statistics.facts()
     recording = RecordingFile(
         channels=robot.channels,
         dofs=robot.dofs,
-        log=LogFile(path, version, table, layout, robot.channels, robot.dofs, wrapped),
+        log=LogFile(path, version, found.samples, robot.channels, robot.dofs, found.wrapped),
         facts=facts,
         first=0,
         last=facts.samples,
         first_time=facts.start,
         last_time=facts.stop,
-        sources=about["sources"],
-        unused_columns=about["unused_columns"],
+        sources=(str(path),),
+        unused_columns=found.unused,
+        column_map=text_of_map(found.samples.layout, robot.channels, robot.dofs, declared, _lengths(robot)),
+        unmeasured=_unmeasured(found.samples.layout, robot.dofs),
     )
-    return recording, find_weaknesses(statistics, robot)
+    return recording, found.sentences(robot)
 
 
 @dataclass(frozen=True)
@@ -91,8 +90,7 @@ class LogFile:
     Attributes:
         path: The file.
         version: Its size and time of change when it was scanned.
-        table: Reads it.
-        layout: The columns that are used.
+        samples: Reads it.
         channels: Names of the position channels.
         dofs: Names of the degrees of freedom.
         wrapped: Channels whose whole turns are taken out.
@@ -100,8 +98,7 @@ class LogFile:
 
     path: Path
     version: tuple[int, int]
-    table: Table
-    layout: Layout
+    samples: Samples
     channels: tuple[str, ...]
     dofs: tuple[str, ...]
     wrapped: tuple[int, ...]
@@ -109,7 +106,7 @@ class LogFile:
     @property
     def seekable(self) -> bool:
         """Whether samples far into the file are found without reading all before them."""
-        return self.table.seekable and not self.wrapped
+        return self.samples.seekable and not self.wrapped
 
     def read(self, first: int = 0, *, time_only: bool = False) -> Iterator[Recording]:
         """All samples from row ``first`` on, in consecutive batches.
@@ -119,9 +116,8 @@ class LogFile:
         """
         if _version(self.path) != self.version:
             raise RecordingError(f"{self.path}: changed while it was in use; run again once it is complete")
-        if time_only and self.layout.time is not None:
-            for columns in self.table.batches((self.layout.time,), first):
-                time = columns[self.layout.time]
+        if time_only and self.samples.layout.time is not None:
+            for time in self.samples.stamps(first):
                 none = np.empty((len(time), 0))
                 yield Recording.unchecked(channels=(), dofs=(), time=time, position=none, torque=none)
             return
@@ -135,8 +131,8 @@ class LogFile:
             row += len(batch)
 
     def _logged(self, first: int) -> Iterator[Recording]:
-        for columns in self.table.batches(self.layout.used, first):
-            yield _recording(columns, self.layout, self, {})
+        for columns in self.samples.batches(first):
+            yield _recording(columns, self.samples.layout, self, {})
 
 
 def _version(path: Path) -> tuple[int, int]:
@@ -144,35 +140,87 @@ def _version(path: Path) -> tuple[int, int]:
     return status.st_size, status.st_mtime_ns
 
 
-def _scan(
-    table: Table, layout: Layout, robot: Robot, source: str, batches: Iterator[Mapping[str, Array]]
-) -> Statistics:
-    """Statistics of all batches, once the checks are passed.
+@dataclass(frozen=True)
+class _Scanned:
+    """A log that passed all checks."""
+
+    samples: Samples
+    statistics: Statistics
+    remarks: tuple[str, ...]
+
+    @property
+    def wrapped(self) -> tuple[int, ...]:
+        return tuple(np.flatnonzero(self.statistics.unwrapped).tolist())
+
+    @property
+    def unused(self) -> tuple[str, ...]:
+        used = set(self.samples.layout.used)
+        return tuple(name for name in self.samples.table.names if name not in used)
+
+    def sentences(self, robot: Robot) -> tuple[str, ...]:
+        return (*self.remarks, *find_weaknesses(self.statistics, robot))
+
+
+def _scan(path: Path, robot: Robot, declared: Declared, parts: list[Columns] | None) -> _Scanned:
+    """A log scanned until there is nothing left to repair, and checked.
+
+    Args:
+        path: The file.
+        robot: The robot.
+        declared: What the user says of it.
+        parts: The rows of the last scan are put here.
 
     Raises:
-        RecordingError: If they are not.
+        RecordingError: If it cannot be used.
     """
-    checks, statistics = SampleChecks(table, layout, source), Statistics(robot, source)
-    for columns in batches:
-        checks.add(columns)
-        if not checks.faulty:
-            statistics.add(_recording(columns, layout, robot, {}))
+    table, source = open_table(path), str(path)
+    if table.nameless and not declared.columns:
+        raise RecordingError(table.nameless)
+    layout = lay_out(table.names, robot.channels, robot.dofs, source, table.labels, declared, _lengths(robot))
+    samples = Samples(table, layout).with_clock_started()
+    samples.check_curves(source)
+    remarks = list(layout.remarks)
+    for _ in range(MOST_ROUNDS):
+        checks = SampleChecks(table.place, samples.layout, source)
+        statistics, survey = Statistics(robot, source), Survey(samples.layout, glitches_of(robot, samples.layout))
+        if parts is not None:
+            parts.clear()
+        for columns in samples.batches():
+            survey.add(columns)
+            checks.add(columns)
+            if not checks.faulty:
+                statistics.add(_recording(columns, samples.layout, robot, {}))
+            if parts is not None:
+                parts.append(columns)
+        found = _better(samples, survey, statistics, robot)
+        if found is None:
+            break
+        samples, remark = found
+        remarks.append(remark)
     checks.finish()
     check_quaternions(statistics, robot)
     check_units(statistics, robot)
-    check_steps(table, layout, statistics)
-    return statistics
+    if samples.layout.clock is not None and samples.layout.clock.units != layout.clock.units:  # type: ignore[union-attr]
+        too_fast(statistics, robot, samples.layout.clock.units[0])
+    check_steps(samples.place, samples.layout, statistics)
+    return _Scanned(samples, statistics, tuple(remarks))
 
 
-def _wrapped(statistics: Statistics) -> tuple[int, ...]:
-    return tuple(np.flatnonzero(statistics.unwrapped).tolist())
+def _better(samples: Samples, survey: Survey, statistics: Statistics, robot: Robot) -> tuple[Samples, str] | None:
+    """The log with one more repair, and what to say of it; None when there is none to make."""
+    return emptied(samples, survey, robot) or _repaired(samples, survey) or decided_unit(samples, survey, statistics)
 
 
-def _about(path: Path, table: Table, layout: Layout) -> dict[str, tuple[str, ...]]:
-    return {
-        "sources": (str(path),),
-        "unused_columns": tuple(name for name in table.names if name not in layout.used),
-    }
+def _repaired(samples: Samples, survey: Survey) -> tuple[Samples, str] | None:
+    found = survey.repaired(samples.repairs, samples.table.place)
+    return None if found is None else (dataclasses.replace(samples, repairs=found[0]), found[1])
+
+
+def _lengths(robot: Robot) -> set[str]:
+    """Channels and degrees of freedom that are lengths."""
+    prismatic = [joint for joint in robot.joints if joint.kind is JointKind.PRISMATIC]
+    names = [robot.channels[joint.channels.start] for joint in prismatic]
+    return {*names, *(robot.dofs[joint.v.start] for joint in prismatic)}
 
 
 def _recording(
@@ -186,8 +234,13 @@ def _recording(
         velocity=None if layout.velocity is None else _stacked(layout.velocity, columns),
         acceleration=None if layout.acceleration is None else _stacked(layout.acceleration, columns),
         torque=_stacked(layout.torque, columns),
+        unmeasured=_unmeasured(layout, names.dofs),
         **about,
     )
+
+
+def _unmeasured(layout: Layout, dofs: Sequence[str]) -> tuple[str, ...]:
+    return tuple(dof for dof, column in zip(dofs, layout.torque, strict=True) if column in layout.unmeasured)
 
 
 def _stacked(names: Sequence[str], columns: Mapping[str, Array]) -> Array:

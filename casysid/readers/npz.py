@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from casysid.archives import ArrayHeader, Unpackable, array_headers, check_ratio
-from casysid.arrays import Array
 from casysid.errors import RecordingError
-from casysid.readers.columns import listing, refuse_too_many
+from casysid.readers.batches import Batch
+from casysid.readers.candidates import Labels
+from casysid.readers.messages import listing, refuse_too_many
 from casysid.readers.npy import open_member
 from casysid.recording.source import BATCH
 
@@ -36,11 +37,21 @@ class NpzTable:
         return tuple(self.columns)
 
     @property
+    def labels(self) -> Labels:
+        """See :class:`~casysid.readers.table.Table`."""
+        return Labels()
+
+    @property
+    def nameless(self) -> str:
+        """See :class:`~casysid.readers.table.Table`."""
+        return ""
+
+    @property
     def seekable(self) -> bool:
         """See :class:`~casysid.readers.table.Table`."""
         return True
 
-    def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
+    def batches(self, names: Sequence[str], first: int = 0) -> Iterator[Batch]:
         """The named columns batch by batch; see :class:`~casysid.readers.table.Table`."""
         keys = list(dict.fromkeys(self.columns[name][0] for name in names))
         rows = self._checked_rows(names, keys)

@@ -126,6 +126,7 @@ class Statistics:
         torque_high: Highest.
         saturated: Rows with a torque at or beyond the effort limit, by degree of freedom.
         repeats: Rows that repeat the one before.
+        unmeasured: Degrees of freedom without a torque.
         turns: Steps of a whole turn, by channel.
         worst_quaternion: By joint, the length farthest from one and its row.
     """
@@ -139,6 +140,7 @@ class Statistics:
         self._torque_squares = np.zeros(robot.nv)
         self.saturated = np.zeros(robot.nv, dtype=np.intp)
         self.repeats = 0
+        self.unmeasured: tuple[str, ...] = ()
         self.turns = np.zeros(len(robot.channels), dtype=np.intp)
         self.worst_quaternion: dict[str, tuple[float, int]] = {}
         self._turned = np.zeros(len(robot.channels))
@@ -161,6 +163,7 @@ class Statistics:
         before = rows.selected(slice(0, 1)) if self._last is None else self._last
         steps = np.diff(rows.position, axis=0, prepend=before.position)
         self._add_torque(rows.torque)
+        self.unmeasured = rows.unmeasured
         self._add_quaternions(rows.position)
         self.has_velocity, self.has_acceleration = rows.has_velocity, rows.has_acceleration
         self.has_time = rows.time is not None and before.time is not None

@@ -11,7 +11,7 @@ import math
 
 from casysid.errors import RecordingError
 from casysid.readers.angles import angle_joints
-from casysid.readers.columns import listing
+from casysid.readers.messages import listing
 from casysid.readers.statistics import Statistics
 from casysid.robot import Robot
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.readers.angles import angle_joints
-from casysid.readers.columns import listing
+from casysid.readers.messages import listing
 from casysid.readers.statistics import SINGLE, Statistics
 from casysid.readers.units import MOST_TURNS
 from casysid.robot import Joint, JointKind, Robot
@@ -167,7 +167,7 @@ def _saturation(log: Statistics, robot: Robot) -> Iterator[str]:
 def _stuck(log: Statistics, robot: Robot) -> Iterator[str]:
     base = {k for j in robot.joints if j.kind is JointKind.FREE_FLYER for k in range(j.v.start, j.v.stop)}
     constant = log.torque_low == log.torque_high
-    stuck = [dof for k, dof in enumerate(robot.dofs) if k not in base and constant[k]]
+    stuck = [dof for k, dof in enumerate(robot.dofs) if k not in base and constant[k] and dof not in log.unmeasured]
     if stuck:
         yield f"torque of {listing(stuck)} is the same in every row: not measured, so it says nothing about that joint"
 

@@ -101,6 +101,8 @@ class RecordingFile(Source):
         changes: What is made of the samples at last; rows are those of the file.
         sources: The file.
         unused_columns: Its columns that were left aside.
+        column_map: Which columns it is read from, as text for :func:`~casysid.recording.read_map`.
+        unmeasured: Degrees of freedom without a torque; zeros stand for it.
     """
 
     channels: tuple[str, ...]
@@ -118,6 +120,8 @@ class RecordingFile(Source):
     _known: dict[int, float] = field(default_factory=dict, init=False, repr=False)
     sources: tuple[str, ...] = ()
     unused_columns: tuple[str, ...] = field(default=(), repr=False)
+    column_map: str = field(default="", repr=False)
+    unmeasured: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return self.last - self.first
@@ -226,6 +230,7 @@ class RecordingFile(Source):
             torque_delay=self.torque_delay,
             sources=self.sources,
             unused_columns=self.unused_columns,
+            unmeasured=self.unmeasured,
             **changed,
         )
 

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from casysid.errors import CasysidWarning, RecordingError
+from casysid.recording.declared import NOTHING, Declared
 from casysid.recording.file import RecordingFile
 from casysid.recording.recording import Recording
 from casysid.robot import Robot
 
 
-def read_recording(path: str | Path, robot: Robot) -> Recording:
+def read_recording(path: str | Path, robot: Robot, declared: Declared = NOTHING) -> Recording:
     """The recording in a CSV (plain or gzipped), Parquet or NPZ file.
 
     Columns are ``time`` [s], then by joint name ``q_<joint>, v_<joint>, a_<joint>, tau_<joint>``, or numbered
@@ -28,13 +29,13 @@ def read_recording(path: str | Path, robot: Robot) -> Recording:
     """
     from casysid.readers.loading import load_recording
 
-    recording, weaknesses = load_recording(Path(path), robot)
+    recording, weaknesses = load_recording(Path(path), robot, declared)
     for weakness in weaknesses:
         warnings.warn(f"{path}: {weakness}", CasysidWarning, stacklevel=2)
     return recording
 
 
-def open_recording(path: str | Path, robot: Robot) -> RecordingFile:
+def open_recording(path: str | Path, robot: Robot, declared: Declared = NOTHING) -> RecordingFile:
     """The recording in a file as :func:`read_recording` reads it, but left there: for logs of any length.
 
     The file is read once for checks and figures, and again whenever samples are asked for.
@@ -45,10 +46,12 @@ def open_recording(path: str | Path, robot: Robot) -> RecordingFile:
     Raises:
         RecordingError: If it cannot be used: file, column and line, and what to do.
     """
-    return open_recordings([path], robot, _level=3)[0]
+    return open_recordings([path], robot, declared, _level=3)[0]
 
 
-def open_recordings(paths: Sequence[str | Path], robot: Robot, *, _level: int = 2) -> tuple[RecordingFile, ...]:
+def open_recordings(
+    paths: Sequence[str | Path], robot: Robot, declared: Declared = NOTHING, *, _level: int = 2
+) -> tuple[RecordingFile, ...]:
     """The recordings in several files, in their order, left there; see :func:`open_recording`.
 
     Raises:
@@ -57,14 +60,14 @@ def open_recordings(paths: Sequence[str | Path], robot: Robot, *, _level: int = 
     from casysid.readers.loading import scan_recording
 
     _require_once(paths)
-    opened = [scan_recording(Path(path), robot) for path in paths]
+    opened = [scan_recording(Path(path), robot, declared) for path in paths]
     for path, (_, weaknesses) in zip(paths, opened, strict=True):
         for weakness in weaknesses:
             warnings.warn(f"{path}: {weakness}", CasysidWarning, stacklevel=_level)
     return tuple(recording for recording, _ in opened)
 
 
-def read_recordings(paths: Sequence[str | Path], robot: Robot) -> tuple[Recording, ...]:
+def read_recordings(paths: Sequence[str | Path], robot: Robot, declared: Declared = NOTHING) -> tuple[Recording, ...]:
     """The recordings in several files, in their order; see :func:`read_recording`.
 
     Raises:
@@ -73,11 +76,29 @@ def read_recordings(paths: Sequence[str | Path], robot: Robot) -> tuple[Recordin
     from casysid.readers.loading import load_recording
 
     _require_once(paths)
-    loaded = [load_recording(Path(path), robot) for path in paths]
+    loaded = [load_recording(Path(path), robot, declared) for path in paths]
     for path, (_, weaknesses) in zip(paths, loaded, strict=True):
         for weakness in weaknesses:
             warnings.warn(f"{path}: {weakness}", CasysidWarning, stacklevel=2)
     return tuple(recording for recording, _ in loaded)
+
+
+def draft_map(path: str | Path) -> str:
+    """What the columns of a log seem to be, without a robot, as the text of a map's file to edit.
+
+    Raises:
+        RecordingError: If the file cannot be read.
+    """
+    from casysid.readers.drafting import draft
+
+    return draft(Path(path))
+
+
+def is_log(path: str | Path) -> bool:
+    """Whether a file is a log by its suffix."""
+    from casysid.readers.table import READ, suffix_of
+
+    return suffix_of(Path(path)) in READ
 
 
 def _require_once(paths: Sequence[str | Path]) -> None:

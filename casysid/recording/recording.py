@@ -45,6 +45,7 @@ class Recording(Source):
             earlier (:func:`casysid.signals.motion_from_recording`). Not written to files.
         sources: Files it came from.
         unused_columns: Columns of those files that were left aside.
+        unmeasured: Degrees of freedom without a torque; zeros stand for it.
 
     Raises:
         RecordingError: On wrong shapes, values that are not finite, time that does not increase, or unordered samples
@@ -61,6 +62,7 @@ class Recording(Source):
     torque_delay: float = 0.0
     sources: tuple[str, ...] = ()
     unused_columns: tuple[str, ...] = field(default=(), repr=False)
+    unmeasured: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         samples = next(iter(np.shape(self.position)), 0)

@@ -42,6 +42,7 @@ class Source(ABC):
         torque_delay: By how much the torque's time stamps are late against the positions' [s].
         sources: Files it came from.
         unused_columns: Columns of those files that were left aside.
+        unmeasured: Degrees of freedom without a torque; zeros stand for it.
     """
 
     channels: tuple[str, ...]
@@ -49,6 +50,7 @@ class Source(ABC):
     torque_delay: float
     sources: tuple[str, ...]
     unused_columns: tuple[str, ...]
+    unmeasured: tuple[str, ...]
 
     @abstractmethod
     def __len__(self) -> int: ...

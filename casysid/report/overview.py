@@ -10,14 +10,19 @@ from casysid.inertia import mass_properties, smallest_eigenvalue
 from casysid.recording import Source
 from casysid.report.tables import Table, mistake_table, number
 from casysid.robot import Robot
+from casysid.robot.likely_bodies import Witness, believed
+from casysid.robot.plausibility import bodies_of
 from casysid.signals import band_of, noise_of
 from casysid.threads import single_threaded
 
 
 @single_threaded()
 def robot_tables(robot: Robot) -> list[tuple[str, Table]]:
-    """Joints with their limits, links with their masses, and the base parameters."""
-    return [("Joints", _joints(robot)), ("Links", _links(robot)), ("Identifiable combinations", _combinations(robot))]
+    """Joints with their limits, links with their inertias, which of those are in doubt, and the base parameters."""
+    witness = believed(robot)
+    doubted = [("Inertial parameters of no body of that size", _doubts(witness))] if witness.replacements else []
+    combinations = ("Identifiable combinations", _combinations(robot))
+    return [("Joints", _joints(robot)), ("Links", _links(robot)), *doubted, combinations]
 
 
 @single_threaded()
@@ -70,17 +75,34 @@ def _joints(robot: Robot) -> Table:
 
 def _links(robot: Robot) -> Table:
     parameters = robot.inertial_parameters.reshape(-1, 10)
-    bodies, smallest = mass_properties(parameters), smallest_eigenvalue(parameters)
+    inertias, smallest, bodies = mass_properties(parameters), smallest_eigenvalue(parameters), bodies_of(robot)
     rows = tuple(
         (
             link,
-            number(float(bodies.mass[k])),
-            ", ".join(number(float(value), 3) for value in bodies.center_of_mass[k]),
+            number(float(inertias.mass[k])),
+            ", ".join(number(float(value), 3) for value in inertias.center_of_mass[k]),
+            ", ".join(number(float(value), 3) for value in bodies.moments[k]),
+            number(float(bodies.gyration[k]), 3),
+            number(float(bodies.length[k]), 3) if bodies.length[k] > 0.0 else "–",
             "yes" if smallest[k] > 0 else "no",
         )
         for k, link in enumerate(robot.links)
     )
-    return Table(("link", "mass [kg]", "centre of mass [m]", "a possible body"), rows)
+    header = (
+        "link",
+        "mass [kg]",
+        "centre of mass [m]",
+        "principal inertia [kg m²]",
+        "radius of gyration [m]",
+        "length [m]",
+        "a possible body",
+    )
+    return Table(header, rows)
+
+
+def _doubts(witness: Witness) -> Table:
+    rows = tuple((one.doubt.link, one.doubt.message, one.words) for one in witness.replacements)
+    return Table(("link", "in the file", "in identification"), rows)
 
 
 def _combinations(robot: Robot) -> Table:

@@ -21,6 +21,7 @@ from casysid.robot.locking import lock_joints, lockable_values
 from casysid.robot.mjcf_actuators import scalar_joint_of_actuator
 from casysid.robot.mjcf_tree import body_names, build_pin_model, find_free_root, joint_names
 from casysid.robot.model import Robot
+from casysid.robot.mujoco_warnings import collected_warnings
 from casysid.robot.xmltext import Element, parse_xml, read_bytes
 
 
@@ -142,7 +143,7 @@ def compile_mjcf(path: Path) -> tuple[Any, Any, list[str]]:
     Raises:
         RobotError: MuJoCo refuses the file.
     """
-    with warnings.catch_warnings(record=True) as caught:
+    with warnings.catch_warnings(record=True) as caught, collected_warnings() as told:
         warnings.simplefilter("always")
         try:
             spec = _parse(path)
@@ -151,7 +152,7 @@ def compile_mjcf(path: Path) -> tuple[Any, Any, list[str]]:
             if "opening file" not in str(error):
                 raise _refusal(path, error) from error
             spec, compiled = _compile_without_files(path, error)
-    return spec, compiled, [str(message.message) for message in caught]
+    return spec, compiled, [*(str(message.message) for message in caught), *told]
 
 
 def _parse(path: Path) -> Any:

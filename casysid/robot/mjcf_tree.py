@@ -68,7 +68,20 @@ def build_pin_model(compiled: Any, *, free_root: int | None = None) -> Any:
         model.appendBodyToJoint(carrier, principal, pose * _pose(compiled.body_ipos[b], compiled.body_iquat[b]))
         model.addFrame(pin.Frame(bodies[b], carrier, 0, pose, pin.FrameType.BODY))
         carriers[b] = carrier, pose
+    _add_fixed_frames(model, compiled, carriers)
     return model
+
+
+def _add_fixed_frames(model: Any, compiled: Any, carriers: dict[int, tuple[int, Any]]) -> None:
+    """Sites and cameras that have a name, as OP_FRAME and SENSOR frames of the joints that move them."""
+    for kind, count, word in (("OP_FRAME", compiled.nsite, "site"), ("SENSOR", compiled.ncam, "cam")):
+        bodies, positions, turns = (getattr(compiled, f"{word}_{part}") for part in ("bodyid", "pos", "quat"))
+        for k in range(count):
+            name = (compiled.site if word == "site" else compiled.camera)(k).name
+            carrier, pose = carriers[bodies[k]]
+            if name:
+                placement = pose * _pose(positions[k], turns[k])
+                model.addFrame(pin.Frame(name, carrier, 0, placement, getattr(pin.FrameType, kind)))
 
 
 def _pose(position: Array, quaternion: Array) -> Any:

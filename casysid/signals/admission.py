@@ -35,9 +35,16 @@ def check_recordings(
         fewest: Samples in time that each must have.
 
     Raises:
-        RecordingError: A recording is too short.
+        RecordingError: A recording is too short, or lacks the torque of a joint.
         ParameterError: Cut-off, time scale or delay are outside what one can show.
     """
+    for recording in recordings:
+        if recording.unmeasured:
+            locks = " ".join(f"--lock {joint}=VALUE" for joint in recording.unmeasured)
+            raise RecordingError(
+                f"{recording.label}: no torque was measured at {', '.join(recording.unmeasured)}, so nothing is known "
+                f"of it; hold it: {locks}"
+            )
     for recording in (one for one in recordings if one.has_time):
         _check_length(recording, fewest)
         scale = 1.0 if time_scale is None else time_scale

@@ -65,7 +65,7 @@ def band_of(spectrum: PositionSpectrum, share: float = 0.99) -> Array:
     many lines reaches by chance count as motion. A channel that never rises above its floor has band 0.
     """
     frequency = spectrum.frequency
-    motion = np.where(_seen(spectrum), spectrum.power, 0.0) * frequency[:, None] ** 2
+    motion = np.where(seen(spectrum), spectrum.power, 0.0) * frequency[:, None] ** 2
     moving = motion[: max(len(motion) // 2, 1)]
     total = np.cumsum(moving, axis=0)
     reached = np.argmax(total >= share * total[-1], axis=0)
@@ -74,7 +74,7 @@ def band_of(spectrum: PositionSpectrum, share: float = 0.99) -> Array:
 
 def speed_of(spectrum: PositionSpectrum) -> Array:
     """Root mean square velocity by channel, shape (n,), sensor noise left out, in the channel's unit a second."""
-    motion = np.where(_seen(spectrum), spectrum.power - _floor(spectrum), 0.0)
+    motion = np.where(seen(spectrum), spectrum.power - _floor(spectrum), 0.0)
     rates = (2.0 * np.pi * spectrum.frequency[: max(len(motion) // 2, 1)]) ** 2
     width = float(spectrum.frequency[1]) if len(spectrum.frequency) > 1 else 0.0
     return np.asarray(np.sqrt(width * (rates @ motion[: len(rates)])))
@@ -97,7 +97,7 @@ def _floor(spectrum: PositionSpectrum) -> Array:
     return np.asarray(np.median(spectrum.power[len(spectrum.power) // 2 :], axis=0) / median)
 
 
-def _seen(spectrum: PositionSpectrum) -> npt.NDArray[np.bool_]:
+def seen(spectrum: PositionSpectrum) -> npt.NDArray[np.bool_]:
     """Lines that noise alone does not reach; of so many, one does by chance in ``exp(3)`` recordings."""
     chance = np.exp(-CHANCE_LINES) / len(spectrum.power)
     highest = float(gammainccinv(spectrum.segments, chance)) / spectrum.segments
@@ -116,7 +116,7 @@ def cutoff_of(spectrum: PositionSpectrum, usual: float = np.inf) -> float:
     """
     frequency, power, floor = spectrum.frequency, spectrum.power, _floor(spectrum)
     fourth = frequency[:, None] ** 4
-    motion = np.where(_seen(spectrum), power - floor, 0.0) * fourth
+    motion = np.where(seen(spectrum), power - floor, 0.0) * fourth
     motion[len(power) // 2 :] = 0.0
     size = motion.sum(axis=0)
     moving = size > 0.0

@@ -13,6 +13,7 @@ from casysid.arrays import Array
 from casysid.errors import CasysidWarning, ParameterError, SolverError
 from casysid.recording import Recording
 from casysid.robot.coordinates import configuration_from_channels
+from casysid.robot.mujoco_warnings import collected_warnings
 from casysid.simulation.controllers import Controller
 from casysid.simulation.plant import Plant
 from casysid.simulation.reference import Reference, Trajectory
@@ -67,7 +68,8 @@ def simulate(
         )
     loop = _Loop(plant, controller, reference, rate, seed)
     start = clock.perf_counter()
-    done = loop.run(progress)
+    with collected_warnings():  # the watchdog tells what they are about
+        done = loop.run(progress)
     return loop.result(done, clock.perf_counter() - start)
 
 

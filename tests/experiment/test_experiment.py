@@ -44,6 +44,9 @@ friction = "plain"
 cutoff = 12
 split = 0.7
 
+[log]
+gear = ["shoulder=1", "elbow=1"]
+
 [payload]
 link = "fore_link"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from casysid.inertia import Consistency, is_consistent
-from casysid.projection import KeptLink, build_projection, project, project_samples, sampling, total_mass
+from casysid.projection import KeptLink, build_projection, cuts, project, project_samples, sampling, total_mass
 from casysid.projection.certificate import certify
 from casysid.projection.misfit import misfit_of_estimate
 from casysid.projection.task import task_of
@@ -40,7 +40,7 @@ def test_samples_are_where_the_convex_solver_puts_them(experiment, consistency, 
     for point in drawn:
         one = dataclasses.replace(task, misfit=dataclasses.replace(misfit, target=misfit.seen @ point))
         exact.append(task.frame.transform @ certify(one, answer.prior_weight).scaled)
-    monkeypatch.setattr(sampling, "ROUNDS", 40)
+    monkeypatch.setattr(cuts, "ROUNDS", 40)
     monkeypatch.setattr(sampling, "certify", None)  # cuts alone
     found = project_samples(problem, drawn, metric, data.prior, answer, residual_energy=energy)
     assert is_consistent(found[:, :30].reshape(-1, 10), consistency, tolerance=1e-9).all()
@@ -65,7 +65,7 @@ def test_what_cuts_do_not_settle_goes_to_the_convex_solver(experiment, monkeypat
     points = data.estimate + 0.1 * np.abs(data.estimate) * np.random.default_rng(1).normal(size=(4, len(data.truth)))
     arguments = (problem, points, data.equations.xx, data.prior, answer)
     cut = project_samples(*arguments, residual_energy=data.residual_energy)
-    monkeypatch.setattr(sampling, "ROUNDS", 0)
+    monkeypatch.setattr(cuts, "ROUNDS", 0)
     solved = project_samples(*arguments, residual_energy=data.residual_energy)
     root = np.linalg.cholesky(regular_metric(data)).T
     away = np.linalg.norm((solved - points) @ root.T, axis=1)

@@ -82,6 +82,19 @@ def test_hostile_models_are_refused_with_a_reason(name, tmp_path):
     assert len(str(caught.value)) < 1000
 
 
+def test_what_mujoco_warns_of_is_in_the_message_and_nowhere_else(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "robot.xml"
+    path.write_text(model(JOINTED.replace('diaginertia=".1', 'diaginertia="nan')))
+    with pytest.raises(RobotError, match="MuJoCo does not accept"):
+        Robot.from_file(path)
+    path.write_text(model(JOINTED + '<site name="s" pos="nan 0 0"/>'))
+    with pytest.warns(CasysidWarning, match="MuJoCo: XML contains a 'NaN'"):
+        Robot.from_file(path)
+    assert list(tmp_path.iterdir()) == [path]
+    assert capfd.readouterr() == ("", "")
+
+
 def test_what_includes_and_attached_models_bring_is_counted(tmp_path):
     (tmp_path / "many.xml").write_text(model(REPLICA.format(3000, JOINTED)))
     (tmp_path / "inner.xml").write_text(f"<mujoco>{REPLICA.format(6000, JOINTED)}</mujoco>")

@@ -293,11 +293,12 @@ def test_a_file_without_armature_gets_a_plausible_one():
     assert (drive_parameters(robot, Plant(robot).parameters)[3] > 0).all()
 
 
-def test_a_robot_that_runs_away_is_stopped_and_leaves_nothing_behind(tmp_path, monkeypatch):
+@pytest.mark.parametrize("times", [3.0, 1e13])
+def test_a_robot_that_runs_away_is_stopped_and_leaves_nothing_behind(times, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     robot = load("head")
     plant = Plant(robot, IDEAL)
-    pushing = ControlModel.from_robot(robot, -3.0 * plant.parameters)
+    pushing = ControlModel.from_robot(robot, -times * plant.parameters)
     motion = design_sinusoids(robot, duration=4.0, ramp=0.4)
     with pytest.warns(CasysidWarning, match="was stopped after"):
         run = simulate(plant, ComputedTorque(pushing, PD(robot, 0.0, 0.0)), motion, rate=RATE, duration=4.0)
@@ -305,6 +306,7 @@ def test_a_robot_that_runs_away_is_stopped_and_leaves_nothing_behind(tmp_path, m
     assert 0 < len(run) < 4.0 * RATE
     assert len(run) == len(run.recording) == len(run.reference)
     assert not list(tmp_path.iterdir())
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_command_that_is_not_finite_is_an_error_at_the_start():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -16,6 +16,7 @@ from casysid.dynamics import (
     DriveState,
     FrictionColumn,
     FrictionKind,
+    JointUse,
     LoadedCoulomb,
     MaxwellSlip,
     Parameter,
@@ -30,6 +31,7 @@ from casysid.identification.friction_candidates import Proposal, joined, joint_u
 from casysid.identification.passes import Passes
 from casysid.identification.settings import Settings
 from casysid.moments import Indices, Moments
+from casysid.robot import Robot
 
 DISPLACEMENTS = (0.0003, 0.003, 0.03, 0.3)
 """Of the elements of friction before sliding, in standard deviations of the position: decades below the travel, down to
@@ -109,12 +111,13 @@ def usual_friction(passes: Passes, settings: Settings) -> tuple[FrictionKind, ..
     return (*friction, *(one for one in usual if one.kind not in there))
 
 
-def gather_candidates(passes: Passes, settings: Settings) -> Candidates:
+def gather_candidates(passes: Passes, settings: Settings, uses: Mapping[int, JointUse] | None = None) -> Candidates:
     """One pass over the recordings with all columns.
 
     Args:
         passes: Over what is fitted.
         settings: Its friction and couplings are the usual model's.
+        uses: How the joints move; None takes it from the passes.
     """
     robot, friction = passes.robot, usual_friction(passes, settings)
     base = build_regressor(
@@ -125,7 +128,8 @@ def gather_candidates(passes: Passes, settings: Settings) -> Candidates:
         torque_gains=settings.torque_gains,
     )
     asked = settings.choose_friction and passes.band.cutoff is not None
-    proposals = _proposals(passes, settings, friction) if asked else ()
+    uses = uses or joint_uses(robot, passes.speed, passes.width, passes.travel)
+    proposals = _proposals(robot, settings, friction, uses) if asked else ()
     directions = joint_directions(robot) if passes.band.cutoff is not None else {}
     gravity = [(FileGravity(), directions[dof]) for dof in directions]
     additions = [*gravity, *(column for proposal in proposals for column in proposal.columns)]
@@ -152,10 +156,11 @@ def _with_columns(
     return found
 
 
-def _proposals(passes: Passes, settings: Settings, friction: Sequence[FrictionKind]) -> tuple[Proposal, ...]:
-    uses = joint_uses(passes.robot, passes.speed, passes.width, passes.travel)
+def _proposals(
+    robot: Robot, settings: Settings, friction: Sequence[FrictionKind], uses: Mapping[int, JointUse]
+) -> tuple[Proposal, ...]:
     kinds = tuple(kind for kind in PHYSICAL_KINDS if kind is not MaxwellSlip)
-    proposals = propose(passes.robot, friction, settings.couplings, uses, kinds)
+    proposals = propose(robot, friction, settings.couplings, uses, kinds)
     if not settings.quasi_static:
         return proposals
     return tuple(one for one in proposals if Armature.kind not in [kind.kind for kind, _ in one.columns])

@@ -5,7 +5,8 @@ A clock that runs ``s`` times too slow makes them ``s²`` times too small beside
 shape of the model file's bodies is evidence enough for factors far from one: each joint's torque is explained by the
 file's gravity torque, its inertial torque, and that joint's own friction and rotor. Where all joints that can tell
 agree that inertia is several times too strong or too weak, other clocks, and gravity and friction alone, are tried on
-blocks of time left out. Moments of gravity's and of the inertial columns kept apart serve all of these trials.
+blocks of time left out, every fifth together. Moments of gravity's and of the inertial columns kept apart serve all of
+these trials.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.dynamics import DEFAULT_FRICTION
-from casysid.estimation.cross_validation import contiguous_folds
+from casysid.estimation.cross_validation import interleaved_folds
 from casysid.identification.passes import Passes
 from casysid.identification.tuning.candidates import Candidates
 from casysid.identification.tuning.held_out import FOLDS
@@ -33,8 +34,6 @@ SIGNIFICANT = 3.0
 """Standard errors that gravity's factor must have for a joint to be asked."""
 MINIMUM_JOINTS = 2
 """So many joints at least must say the same."""
-WORTHWHILE_GAIN = 0.3
-"""Fall of the torque error for another reading of the clock: half of its energy."""
 CLOCK_TOLERANCE = 0.2
 """Logged velocities within this of the differentiated positions confirm the clock."""
 SCALES = np.geomspace(1e-2, 1e2, 185)
@@ -202,7 +201,7 @@ def _decide(split: SplitMoments, share: float, *, confirmed: bool) -> TimeBase:
     if not confirmed and share > 0.0:
         readings.append(_best_scale(split))
     scores = [_score(split, scale) for scale in readings]
-    taken = simplest_within_one_error(scores, WORTHWHILE_GAIN)
+    taken = simplest_within_one_error(scores)
     if taken == 0:
         return TimeBase(inertial_share=share)
     everyone = np.ones(len(split.squares), dtype=bool)
@@ -224,8 +223,12 @@ def _best_scale(split: SplitMoments) -> float:
 
 
 def _score(split: SplitMoments, scale: float) -> HeldOutScore:
-    """Of gravity and inertia tied together by a clock, stretches of time left out."""
-    folds = contiguous_folds(len(split.squares[0]), FOLDS)
+    """Of gravity and inertia tied together by a clock, one block of time in so many left out.
+
+    Factors of gravity and friction free for every joint extrapolate badly to a part of the motion that none has seen,
+    whatever the clock.
+    """
+    folds = interleaved_folds(len(split.squares[0]), FOLDS)
     shape = len(folds), len(split.squares)
     energy, target, count, variance = (np.zeros(shape) for _ in range(4))
     for j, (squares, rows) in enumerate(zip(split.squares, split.count, strict=True)):

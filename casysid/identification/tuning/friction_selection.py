@@ -20,23 +20,28 @@ from casysid.dynamics import Parameter, Regressor
 from casysid.errors import CasysidWarning
 from casysid.estimation import EmpiricalBayes, Estimate
 from casysid.estimation.cross_validation import contiguous_folds
+from casysid.estimation.empirical_bayes import INFLATION
 from casysid.estimation.evidence import centre_of
 from casysid.identification.friction_candidates import Proposal, joined
 from casysid.identification.friction_laws import physics_rows
 from casysid.identification.settings import Settings
 from casysid.identification.tuning.candidates import Candidates
 from casysid.identification.tuning.held_out import FOLDS, HeldOut
-from casysid.identification.tuning.log_score import PRACTICAL_GAIN, HeldOutScore
+from casysid.identification.tuning.log_score import HeldOutScore
 from casysid.inertia import Consistency
 from casysid.moments import Indices
-from casysid.projection import LinearKnowledge, build_projection, possible_parameters
+from casysid.projection import LinearKnowledge, PossibleParameters, build_projection
 
 MOST = 30
 """Kinds that may join: more than any robot's drives have."""
+CLEARLY_BETTER = 1.0 / 3.0
+"""Fall of the energy of its joints' errors on time left out for which a kind joins: of a hundred candidates one gains
+something on any motion, and a spring or a ripple that is not there costs the next motion more than it gained here."""
 CLEARLY_BROKEN = 2.0
 """Standard errors by which a law of other columns must be missed to keep a candidate out: the fit to come holds it."""
-ROUNDS = 12
-"""Of each fit on the way: past the cautious ones and two inflations of the scores; the last fit takes what it needs."""
+ROUNDS, MORE_ROUNDS = 12, 4
+"""Of the first fit on the way, past the cautious ones and two inflations of the scores, and of those that go on from
+the one before; the last fit takes what it needs."""
 AT_ZERO = 1e-7
 """A coefficient below this share of the largest is zero to the convex solver."""
 
@@ -91,15 +96,16 @@ class FrictionChoice:
     taken: tuple[tuple[Proposal, Columns], ...] = field(default=(), repr=False)
 
 
-def select_friction(candidates: Candidates, settings: Settings) -> FrictionChoice:
+def select_friction(candidates: Candidates, settings: Settings, usual: Estimate | None = None) -> FrictionChoice:
     """The candidates that join the usual model.
 
     Args:
         candidates: From one pass over the data.
         settings: Whose friction they join.
+        usual: The fit of the usual model, if there is one already.
     """
-    search = _Search(candidates, settings)
-    while len(search.taken) < MOST and search.add_one():
+    search = _Search(candidates, settings, usual)
+    while len(search.taken) < MOST and search.add_some():
         pass
     model = joined(candidates.base.friction, settings.couplings, [proposal for proposal, _ in search.taken])
     return FrictionChoice(
@@ -113,7 +119,7 @@ def select_friction(candidates: Candidates, settings: Settings) -> FrictionChoic
 class _Search:
     """The model so far, and what is asked of it."""
 
-    def __init__(self, candidates: Candidates, settings: Settings) -> None:
+    def __init__(self, candidates: Candidates, settings: Settings, usual: Estimate | None) -> None:
         self._candidates, self._settings = candidates, settings
         self.taken: list[tuple[Proposal, Columns]] = []
         self.chosen: list[ChosenFriction] = []
@@ -122,39 +128,43 @@ class _Search:
         self._centre = centre_of(moments, candidates.regressor.prior)
         self._shifted = moments.shifted(self._centre)
         self._folds = contiguous_folds(moments.blocks, FOLDS)
+        self._fit = usual
 
-    def add_one(self) -> bool:
-        """Let the best candidate that passes join; False when none does."""
+    def add_some(self) -> bool:
+        """Let the best candidates that pass join, at most one a joint before the next fit; False when none does."""
         names = {proposal.name for proposal, _ in self.taken}
         left = [one for one in self._candidates.proposals if one[0].name not in names]
         if not left or len(self._folds) < 2:
             return False
-        held_out, noise = self._held_out()
-        gains = np.array([held_out.gain(columns, noise) for _, columns in left])
+        held_out = self._held_out()
+        gains = np.array([held_out.gain(columns, self._noise) for _, columns in left])
+        new, joints = Columns(), set[int]()
         without = held_out.score()
         for place in np.argsort(-gains, kind="stable").tolist():
             if gains[place] <= np.log(len(self._candidates.proposals)):
-                return False
+                break
             proposal, columns = left[place]
-            score = held_out.score(columns)
-            if self._is_better(proposal, without, score) and self._is_lawful(held_out, columns, noise):
+            if joints & set(proposal.joints):
+                continue
+            score = held_out.score((*new, *columns))
+            if self._is_better(proposal, without, score) and self._is_lawful(held_out, new, columns):
                 self.taken.append((proposal, columns))
                 self.chosen.append(self._described(proposal, without, score, float(gains[place])))
-                return True
-        return False
+                new, without = (*new, *columns), score
+                joints |= set(proposal.joints)
+        return bool(new)
 
-    def _held_out(self) -> tuple[HeldOut, float]:
-        """Errors beside the fit of the model so far, coefficients that a law holds at zero left out; and ``κ``."""
+    def _held_out(self) -> HeldOut:
+        """Errors beside the fit of the model so far, coefficients that a law holds at zero left out."""
         model = self._candidates.model([columns for _, columns in self.taken])
         parameters = [self._candidates.parameters[column] for column in model]
-        estimate = fit_model(self._candidates, model, self._settings)
+        estimate = self._fit = fit_model(self._candidates, model, self._settings, self._fit)
         free = model[~at_zero(parameters, estimate.parameters)]
         kept = np.isin(model, free)
         weights = estimate.noise_std**-2.0
         pull = estimate.metric - self._candidates.moments.select_columns(model).pooled(weights).xx
-        self._weights = weights
-        held_out = HeldOut(self._shifted, free, weights, pull[np.ix_(kept, kept)], self._folds)
-        return held_out, estimate.diagnostics["score_inflation"]
+        self._weights, self._noise = weights, estimate.diagnostics[INFLATION]
+        return HeldOut(self._shifted, free, weights, pull[np.ix_(kept, kept)], self._folds)
 
     def _rows(self, proposal: Proposal) -> list[int]:
         """Rows on which a proposal acts."""
@@ -165,17 +175,18 @@ class _Search:
     def _is_better(self, proposal: Proposal, without: HeldOutScore, score: HeldOutScore) -> bool:
         rows = self._rows(proposal)
         before, after = (one.energy[:, rows] @ self._weights[rows] for one in (without, score))
-        clear = after.sum() <= (1.0 - PRACTICAL_GAIN) ** 2 * before.sum()
+        clear = after.sum() <= (1.0 - CLEARLY_BETTER) * before.sum()
         no_worse = (score.energy @ self._weights).sum() < (without.energy @ self._weights).sum()
         return bool((after < before).all() and clear and no_worse)
 
-    def _is_lawful(self, held_out: HeldOut, columns: Columns, noise: float) -> bool:
+    def _is_lawful(self, held_out: HeldOut, joined: Columns, columns: Columns) -> bool:
         """Whether the fit to all data keeps the candidate's laws, and hardly breaks any that the fit without it keeps.
 
         Coefficients of friction that is not there are zero but for their noise, and change sign with any candidate.
         """
-        before, after = (self._laws @ (self._centre + held_out.fit(own)) for own in ((), columns))
-        C = held_out.covariance(columns, noise)
+        both = (*joined, *columns)
+        before, after = (self._laws @ (self._centre + held_out.fit(own)) for own in (joined, both))
+        C = held_out.covariance(both, self._noise)
         error = np.sqrt(np.maximum(np.einsum("rm,mn,rn->r", self._laws, C, self._laws, optimize=True), 0.0))
         own = (self._laws[:, list(columns)] != 0.0).any(axis=1)
         kept = (after >= 0.0) | (~own & ((before < 0.0) | (after >= -CLEARLY_BROKEN * error)))
@@ -193,8 +204,8 @@ class _Search:
         return ChosenFriction(joints, proposal.kind, proposal.description, before, after, evidence)
 
 
-def fit_model(candidates: Candidates, model: Indices, settings: Settings) -> Estimate:
-    """The fit of some of the candidates' columns, possible parameters only."""
+def fit_model(candidates: Candidates, model: Indices, settings: Settings, like: Estimate | None = None) -> Estimate:
+    """The fit of some of the candidates' columns, possible parameters only, going on from that of fewer."""
     parameters = [candidates.parameters[column] for column in model]
     prior = np.array([parameter.prior for parameter in parameters])
     problem = build_projection(
@@ -203,10 +214,10 @@ def fit_model(candidates: Candidates, model: Indices, settings: Settings) -> Est
         knowledge=(*settings.knowledge, *_laws_of(candidates.regressor, parameters)),
     )
     moments = candidates.moments.select_columns(model)
-    method = EmpiricalBayes(standard_errors=False, iterations=ROUNDS)
+    method = EmpiricalBayes(standard_errors=False, iterations=MORE_ROUNDS if like else ROUNDS, like=like)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CasysidWarning)  # of an inconsistent model file: the answer's projection warns
-        return method.estimate_among(moments, prior, possible_parameters(problem, prior))
+        return method.estimate_among(moments, prior, PossibleParameters(problem, prior))
 
 
 def at_zero(parameters: Sequence[Parameter], values: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
