@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from casysid.excitation import build_excitation as build_excitation
     from casysid.excitation import design_excitation as design_excitation
     from casysid.excitation import write_excitation as write_excitation
+    from casysid.experiment import read_experiment as read_experiment
+    from casysid.experiment import run_experiment as run_experiment
     from casysid.identification import IdentificationResult as IdentificationResult
     from casysid.identification import Settings as Settings
     from casysid.identification import compare as compare
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
     from casysid.kinematics import Kinematics as Kinematics
     from casysid.model import RobotModel as RobotModel
     from casysid.moments import Moments as Moments
+    from casysid.payload import identify_payload as identify_payload
     from casysid.reaching import InverseKinematics as InverseKinematics
     from casysid.reaching import LookAt as LookAt
     from casysid.reaching import PoseTarget as PoseTarget
@@ -81,15 +84,18 @@ _HOMES = {
     "find_model": "casysid.bundled",
     "generate_c": "casysid.dynamics",
     "identify": "casysid.identification",
+    "identify_payload": "casysid.payload",
     "identify_fleet": "casysid.identification.many",
     "identify_many": "casysid.identification.many",
     "open_recording": "casysid.recording",
     "open_recordings": "casysid.recording",
     "prepare": "casysid.identification",
+    "read_experiment": "casysid.experiment",
     "read_recording": "casysid.recording",
     "read_recordings": "casysid.recording",
     "read_result": "casysid.identification.saved",
     "rehearse": "casysid.validation",
+    "run_experiment": "casysid.experiment",
     "simulate": "casysid.simulation",
     "write_excitation": "casysid.excitation",
     "write_report": "casysid.report",

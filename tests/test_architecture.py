@@ -24,8 +24,10 @@ ORDER = (
     ("uncertainty", "simulation"),
     ("model",),
     ("identification",),
+    ("payload",),
     ("validation",),
     ("report",),
+    ("experiment",),
     ("cli",),
 )
 LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}

@@ -28,18 +28,21 @@ def words(code):
 
 
 SHELL = [line for language, code in BLOCKS if language == "sh" for line in words(code) if line not in NOT_RUN]
+EXPERIMENTS = [code for language, code in BLOCKS if language == "toml"]
 PYTHON = [code for language, code in BLOCKS if language == "python"]
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A small arm's file, two logs of it, and the virtual environment where ``make`` leaves it."""
+    """A small arm's file, two logs of it, an experiment, and the virtual environment where ``make`` leaves it."""
     place = tmp_path_factory.mktemp("readme")
     shutil.copy(find_model("two_link.urdf"), place / "arm.urdf")
     (place / "logs").mkdir()
     for seed, name in enumerate(("log.csv", "other.csv")):
         log = simulated_run("two_link.urdf", seed, PlantSettings(), 4.0).recording.write(place / name)
         shutil.copy(log, place / "logs")
+    (experiment,) = EXPERIMENTS
+    (place / "experiment.toml").write_text(experiment, encoding="utf-8")
     if (Path(sys.prefix) / "bin" / "activate").is_file():
         (place / ".venv").symlink_to(sys.prefix)
     return place
@@ -70,5 +73,5 @@ def test_the_shell_finds_and_runs_every_command(folder):
     if not (folder / ".venv").exists():
         pytest.skip("these tests run outside a virtual environment, so there is none to activate")
     run(["bash", "-euc", "\n".join(SHELL)], folder)
-    for name in ("rehearsed", "excite", "run", "fleet", "identified", "excitation", "validated"):
+    for name in ("rehearsed", "excite", "run", "fleet", "identified", "excitation", "validated", "answers"):
         assert any((folder / name).iterdir())

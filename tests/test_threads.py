@@ -50,6 +50,7 @@ NO_DOORS = {
     "open_recordings": "scan_recording is its door",
     "parameter_within": "what is known, in words",
     "read_earlier_result": "a file",
+    "read_experiment": "a file",
     "read_recording": "load_recording is its door",
     "read_recordings": "load_recording is its door",
     "read_result": "files",

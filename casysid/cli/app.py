@@ -13,9 +13,11 @@ from casysid.cli.excite import excite
 from casysid.cli.gravity import CommandWithGravity
 from casysid.cli.identify import identify
 from casysid.cli.info import info
+from casysid.cli.payload import payload
 from casysid.cli.pose import pose
 from casysid.cli.reach import reach
 from casysid.cli.rehearse import rehearse
+from casysid.cli.run import run
 from casysid.cli.validate import validate
 
 app = typer.Typer(
@@ -59,9 +61,14 @@ app.command(epilog="Example: casysid compare arm.urdf excite.csv --split 0.6 --m
 app.command(
     epilog="Examples: casysid excite arm.urdf --out excite  ·  casysid excite head --out next --log earlier.csv"
 )(excite)
+app.command(
+    epilog="Examples: casysid payload arm.urdf --without empty.csv --with gripper.csv  ·  "
+    "casysid payload arm.urdf --without empty.csv --with box=a.csv --with tool=b.csv --mass tool=1.2"
+)(payload)
 app.command(epilog="Examples: casysid rehearse head  ·  casysid rehearse arm.urdf --duration 20 --out rehearsal")(
     rehearse
 )
+app.command(epilog="Example: casysid run experiment.toml  ·  casysid run run/experiment.toml --out again")(run)
 app.command(epilog="Example: casysid validate identified/identified.urdf other.csv")(validate)
 app.command(epilog="Examples: casysid info arm.urdf  ·  casysid info arm.urdf excite.csv.gz")(info)
 app.command(

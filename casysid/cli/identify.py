@@ -144,7 +144,7 @@ def identify(
                 add_report(result, stage)
                 if fleet is not None:
                     add_fleet(fleet, stage)
-        word = _print(console, result, notes)
+        word = tell_result(console, result, notes)
         if fleet is not None:
             console.print(rich_table("Differences between machines", *fleet_rows(fleet)))
         tell_path(out / "result.json")
@@ -175,7 +175,8 @@ def _run_many(
     return fleet.pooled, fleet
 
 
-def _print(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> Word:
+def tell_result(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> Word:
+    """The tables, the verdict, and what else a person should know."""
     from casysid.cli.console import rich_table, say
     from casysid.identification.verdict import judge
     from casysid.report import drive_table, error_table, link_table, noise_table

@@ -38,18 +38,27 @@ _DOCS = {
 
 def write_c(model: RobotModel, folder: Path, name: str) -> tuple[Path, ...]:
     """See :meth:`RobotModel.write_c`."""
+    texts = c_files(model, name)
+    with run_folder(folder) as stage:
+        for file, text in texts.items():
+            (stage.folder / file).write_text(text, encoding="utf-8")
+    return tuple(folder / file for file in texts)
+
+
+def c_files(model: RobotModel, name: str = "robot_model") -> dict[str, str]:
+    """What these files hold, by name.
+
+    Raises:
+        ParameterError: The name is no C identifier.
+    """
     if not (name.isidentifier() and name.isascii()):
         raise ParameterError(f"C source: the name must be a C identifier such as robot_model; got {name!r}")
-    texts = {
+    return {
         f"{name}.h": _header(model, name),
         f"{name}.c": _source(model, name),
         f"test_{name}.c": _test(model, name),
         "CMakeLists.txt": _cmake(name),
     }
-    with run_folder(folder) as stage:
-        for file, text in texts.items():
-            (stage.folder / file).write_text(text, encoding="utf-8")
-    return tuple(folder / file for file in texts)
 
 
 def _header(model: RobotModel, name: str) -> str:

@@ -72,7 +72,9 @@ def _sizes(result: IdentificationResult) -> Iterator[Criterion]:
         origin="no body has its mass further out than the robot reaches",
     )
     rotors = result.drive_vector("armature")
-    largest = max(_heaviest(bodies, reach), _heaviest(result.regressor.robot.inertial_parameters.reshape(-1, 10), reach))
+    largest = max(
+        _heaviest(bodies, reach), _heaviest(result.regressor.robot.inertial_parameters.reshape(-1, 10), reach)
+    )
     worst = int(np.argmax(rotors)) if len(rotors) else 0
     heaviest = float(rotors[worst]) if len(rotors) else 0.0
     yield Criterion(
