@@ -103,7 +103,7 @@ def identify(
     """Identify a robot's parameters from recordings.
 
     Args:
-        robot: The robot; its own parameters are the prior.
+        robot: The robot; its own parameters are the prior, where they are those of a body (:func:`believed`).
         recordings: What is fitted.
         settings: Hyperparameters; the defaults let the data decide.
         held_out: Recordings that are only predicted.
