@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from casysid.arrays import Array
 from casysid.estimation import Status
 from casysid.identification.result import IdentificationResult
 from casysid.identification.verdict.criteria import Criterion, Word, names
@@ -87,7 +88,7 @@ def _sizes(result: IdentificationResult) -> Iterator[Criterion]:
     )
 
 
-def _heaviest(bodies: np.ndarray, reach: float) -> float:
+def _heaviest(bodies: Array, reach: float) -> float:
     """What all links together can put on one joint: their mass at the reach, and their own inertias [kg m²]."""
     return float(np.abs(bodies[:, 0]).sum() * reach**2 + np.abs(bodies[:, [4, 6, 9]]).max(axis=1).sum())
 
