@@ -1,4 +1,4 @@
-"""NumPy archives: arrays named as columns, or matrices q, v, a, tau with a column a channel in the model file's order."""
+"""NumPy archives: arrays named as columns, or matrices q, v, a, tau with a column a channel in the file's order."""
 
 from __future__ import annotations
 
