@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from casysid.arrays import Array
 from casysid.estimation import Status
 from casysid.identification.result import IdentificationResult
 from casysid.identification.verdict.criteria import Criterion, Word, names
@@ -22,15 +23,7 @@ SEEN = 0.5
 
 def body_criteria(result: IdentificationResult) -> Iterator[Criterion]:
     """Of solver, signs and consistency, sizes, and what the file decided."""
-    unfinished = result.status is not Status.CONVERGED
-    yield Criterion(
-        name="solver",
-        value=float(unfinished),
-        limit=0.0,
-        word=Word.DOUBTFUL,
-        reason=f"The estimator did not finish: {result.status.value}. What it reached is judged like any other answer.",
-        origin="an answer is known to be the best only at the end",
-    )
+    yield _fatal("solver", result.status is Status.DEGENERATE, f"The estimator found nothing: {result.status.value}.")
     links = result.inconsistent_links
     impossible = f"No body can have the inertia of {names(links)}: the pseudo-inertia is not positive definite."
     yield _fatal("consistency", bool(links), impossible)
@@ -89,7 +82,7 @@ def _sizes(result: IdentificationResult) -> Iterator[Criterion]:
     )
 
 
-def _heaviest(bodies: np.ndarray, reach: float) -> float:
+def _heaviest(bodies: Array, reach: float) -> float:
     """What all links together can put on one joint: their mass at the reach, and their own inertias [kg m²]."""
     return float(np.abs(bodies[:, 0]).sum() * reach**2 + np.abs(bodies[:, [4, 6, 9]]).max(axis=1).sum())
 

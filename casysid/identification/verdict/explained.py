@@ -48,11 +48,9 @@ class Unexplained:
         Without held-out data no less than in cross-validation over blocks of time.
         """
         missed = _missed(self.judge)
-        return (
-            missed
-            if self.result.held_out
-            else np.fmax(missed, missed_on_blocks(self.result.moments, self.result.regressor))
-        )
+        if self.result.held_out:
+            return missed
+        return np.asarray(np.fmax(missed, missed_on_blocks(self.result.moments, self.result.regressor)))
 
     @cached_property
     def silent(self) -> tuple[str, ...]:

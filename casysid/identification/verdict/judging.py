@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from casysid.estimation import Status
 from casysid.identification.result import IdentificationResult
 from casysid.identification.verdict.bodies import body_criteria
 from casysid.identification.verdict.corrections import correction_criteria
@@ -35,6 +36,8 @@ def _remarks(unexplained: Unexplained) -> list[str]:
     result = unexplained.result
     found = (result.time_base.reason, result.torque_gains.reason)
     remarks = [f"{reason[:1].upper()}{reason[1:]}." for reason in found if reason]
+    if result.status is Status.MAX_ITERATIONS:
+        remarks.append(f"The estimator did not finish, but {result.status.value}; what it reached is judged as it is.")
     if result.held_out is None:
         missed = unexplained.by_joint
         most = "none is told" if np.isnan(missed).all() else f"at most {np.nanmax(missed):.1%} of a joint's torque"
