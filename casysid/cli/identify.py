@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from casysid.cli.known_facts import KeepOption, LinkMassOption, TotalMassOption, known_facts
 from casysid.cli.log_options import (
     ConstantOption,
     EfficiencyOption,
@@ -88,6 +90,9 @@ def identify(
     motor_constant: ConstantOption = None,
     gear: GearOption = None,
     efficiency: EfficiencyOption = None,
+    mass_total: TotalMassOption = None,
+    mass: LinkMassOption = None,
+    keep: KeepOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
     floating_base: FloatingOption = False,
@@ -115,6 +120,7 @@ def identify(
         settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise, friction, flip)
         said = declared_of(units, columns, motor_constant, gear, efficiency)
         model = load_robot(robot, gravity, lock, floating_base)
+        settings = dataclasses.replace(settings, knowledge=known_facts(model, mass_total, mass, keep))
         many = scheduler is not None or by is not None or any(map(holds_logs, logs))
         fitted, unseen = ([], []) if many else load_recordings(model, logs, held_out, split, said)
         fleet = None
