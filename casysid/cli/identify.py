@@ -114,6 +114,7 @@ def identify(
         from casysid.outputs import check_run_folder
         from casysid.readers.table import holds_logs
         from casysid.report import add_report
+        from casysid.report.summary import Origin
 
         check_run_folder(out, FILES, SMALLEST_RUN)
         noise = noise_levels(noise_position, noise_velocity, noise_acceleration)
@@ -132,7 +133,9 @@ def identify(
             progress("write", 0.0)
             with console.run_folder(out, identity_of(result), claims=FILES) as stage:
                 notes = add_result(result, stage, export_inconsistent=export_inconsistent)
-                add_report(result, stage)
+                add_report(
+                    result, stage, Origin.of([model.source, *logs, *(held_out or [])], ["casysid", *sys.argv[1:]])
+                )
                 if fleet is not None:
                     add_fleet(fleet, stage)
         tell_result(console, result, notes)
