@@ -120,7 +120,7 @@ def rich_table(title: str, header: tuple[str, ...], rows: tuple[tuple[str, ...],
         pad_edge=False,
     )
     for k, name in enumerate(header):
-        table.add_column(Text(printable(name)), justify="left" if k == 0 else "right", overflow="fold")
+        table.add_column(Text(printable(name)), justify="left" if k == 0 else "right", no_wrap=k == 0, overflow="fold")
     for row in rows:
         table.add_row(*(Text(printable(cell)) for cell in row))
     return table

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from casysid.cli.gravity import in_its_gravity, is_auto
+from casysid.cli.known_facts import KeepOption, LinkMassOption, TotalMassOption, known_facts
 from casysid.cli.log_options import (
     ConstantOption,
     EfficiencyOption,
@@ -92,6 +94,9 @@ def identify(
     motor_constant: ConstantOption = None,
     gear: GearOption = None,
     efficiency: EfficiencyOption = None,
+    mass_total: TotalMassOption = None,
+    mass: LinkMassOption = None,
+    keep: KeepOption = None,
     gravity: GravityOption = None,
     lock: LockOption = None,
     floating_base: FloatingOption = False,
@@ -117,12 +122,14 @@ def identify(
         from casysid.outputs import check_run_folder
         from casysid.readers.table import holds_logs
         from casysid.report import add_report
+        from casysid.report.summary import Origin
 
         check_run_folder(out, FILES, SMALLEST_RUN)
         noise = noise_levels(noise_position, noise_velocity, noise_acceleration)
         settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise, friction, flip)
         said = declared_of(units, columns, motor_constant, gear, efficiency)
         model = load_robot(robot, None if is_auto(gravity) else gravity, lock, floating_base)
+        settings = dataclasses.replace(settings, knowledge=known_facts(model, mass_total, mass, keep))
         many = scheduler is not None or by is not None or any(map(holds_logs, logs))
         fitted, unseen = ([], []) if many else load_recordings(model, logs, held_out, split, said)
         fleet = None
@@ -141,7 +148,9 @@ def identify(
             progress("write", 0.0)
             with console.run_folder(out, identity_of(result), claims=FILES) as stage:
                 notes = add_result(result, stage, export_inconsistent=export_inconsistent)
-                add_report(result, stage)
+                add_report(
+                    result, stage, Origin.of([model.source, *logs, *(held_out or [])], ["casysid", *sys.argv[1:]])
+                )
                 if fleet is not None:
                     add_fleet(fleet, stage)
         word = tell_result(console, result, notes)

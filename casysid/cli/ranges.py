@@ -30,6 +30,7 @@ RANGES: Mapping[str, Range] = {
     "--split": Range(0.01, 0.99, " of the time", "a hundredth of a recording fits and judges nothing"),
     "--cutoff": Range(0.01, 1e4, " Hz", "a motion of 100 s, and half the fastest rate of logs in use, 20 kHz"),
     "--time-scale": Range(1e-9, 3600.0, "", "stamps in nanoseconds to hours"),
+    "--mass-total": Range(1e-6, 1e6, " kg", "a milligram, and a thousand tonnes"),
     "--mass": Range(1e-6, 1e6, " kg", "a milligram, and a thousand tonnes"),
     "--delay": Range(-1.0, 1.0, " s", "a controller a second behind holds no robot"),
     "--noise-position": Range(0.0, 0.1, " rad or m", "a sensor that is wrong by six degrees measures no motion"),

@@ -25,6 +25,7 @@ from casysid.outputs import Stage, run_folder
 from casysid.payload import PayloadResult, identify_payload
 from casysid.recording import Declared, Source, open_recordings, parse_drive, parse_units, read_map
 from casysid.report import add_report
+from casysid.report.summary import Origin
 from casysid.robot import Robot
 from casysid.signals import NoiseLevels
 from casysid.threads import single_threaded
@@ -103,7 +104,7 @@ def run_experiment(experiment: Experiment, *, progress: Progress = silent, folde
     with folder(Path(outputs["folder"]), identity_of(result), claims=FILES) as stage:
         notes = add_result(result, stage, export_inconsistent=outputs["export_inconsistent"])
         if outputs["report"]:
-            add_report(result, stage)
+            add_report(result, stage, Origin(f"casysid run {EXPERIMENT_FILE}", digests))
         if payloads is not None:
             write_json(payloads.to_json(), stage.folder / PAYLOAD_FILE)
         if outputs["c_code"]:

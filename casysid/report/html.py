@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -11,6 +12,7 @@ from casysid.identification.output import identity_of
 from casysid.identification.verdict import judge
 from casysid.outputs import Stage, add_to_run, write_whole
 from casysid.report.pictures import inline_png, torque_figure
+from casysid.report.summary import Origin, base_parameter_table, summary_sentences
 from casysid.report.tables import (
     Table,
     choice_table,
@@ -36,27 +38,30 @@ class Section:
 
 
 @single_threaded()
-def write_report(result: IdentificationResult, path: str | Path) -> None:
+def write_report(result: IdentificationResult, path: str | Path, origin: Origin | None = None) -> None:
     """Write ``report.html``, whole or not at all; in the folder of :func:`~casysid.write_result` it joins its files.
 
     Raises:
         OutputError: It cannot be written, or the folder has a report of another result, which has replaced this one.
     """
-    add_to_run(path, _bytes(result), identity_of(result))
+    add_to_run(path, _bytes(result, origin), identity_of(result))
 
 
 @single_threaded()
-def add_report(result: IdentificationResult, stage: Stage) -> None:
+def add_report(result: IdentificationResult, stage: Stage, origin: Origin | None = None) -> None:
     """Write ``report.html`` to where a run's files wait."""
-    write_whole(stage.folder / "report.html", _bytes(result))
+    write_whole(stage.folder / "report.html", _bytes(result, origin))
 
 
 @single_threaded()
-def render_report(result: IdentificationResult) -> str:
-    """The report as HTML text."""
-    from jinja2 import Environment
+def render_report(result: IdentificationResult, origin: Origin | None = None) -> str:
+    """The report as HTML text.
 
-    from casysid import __version__
+    Args:
+        result: What it is about.
+        origin: Command and inputs, where they are known.
+    """
+    from jinja2 import Environment
 
     template = resources.files("casysid.report").joinpath("template.html").read_text(encoding="utf-8")
     return (
@@ -66,10 +71,18 @@ def render_report(result: IdentificationResult) -> str:
             robot=result.robot.name,
             facts=_facts(result),
             verdict=judge(result),
-            sections=_sections(result),
-            footer=f"casysid {__version__}, {sum(result.seconds.values()):.1f} s",
+            summary=summary_sentences(result),
+            sections=[*_sections(result), *_origin_sections(result, origin or Origin())],
+            footer=f"casysid {version()}, {sum(result.seconds.values()):.1f} s",
         )
     )
+
+
+def version() -> str:
+    """Of casysid."""
+    from casysid import __version__
+
+    return __version__
 
 
 def _facts(result: IdentificationResult) -> list[str]:
@@ -100,13 +113,17 @@ def _sections(result: IdentificationResult) -> list[Section]:
             "residuals as large as in the fit.",
             picture=inline_png(torque_figure(result)),
         ),
-        Section("Friction and drive", "SI units at the joint.", table=drive_table(result)),
+        Section(
+            "What the torque depends on",
+            "The combinations of parameters that any motion can show, with standard errors; ∞: not recorded.",
+            table=base_parameter_table(result),
+        ),
+        Section("Friction and drive", "At the joint, with standard errors.", table=drive_table(result)),
         Section(
             "Links",
-            "In the joint's frame. ∞: the data cannot tell this number by itself, it follows the model file.",
+            "In the joint's frame. ∞: the data cannot tell this number by itself, it follows the model file, and is "
+            "shown with a ~ and two digits.",
             table=link_table(result),
-            lines_title=f"The {result.structural.rank} combinations that the torque depends on",
-            lines=result.structural.words(),
         ),
         Section(
             "What decided the links' parameters",
@@ -134,5 +151,24 @@ def _sections(result: IdentificationResult) -> list[Section]:
     return sections
 
 
-def _bytes(result: IdentificationResult) -> bytes:
-    return render_report(result).encode(errors="backslashreplace")
+def _origin_sections(result: IdentificationResult, origin: Origin) -> list[Section]:
+    """Command, inputs and settings: what it takes to get the same again."""
+    inputs = origin.table() if origin.inputs else None
+    settings = tuple(
+        f"{field.name} = {getattr(result.choices.settings, field.name)!r}"
+        for field in dataclasses.fields(result.choices.settings)
+    )
+    text = f"casysid {version()}." + (f" Command: {origin.command}" if origin.command else "")
+    return [
+        Section(
+            "Where it comes from",
+            text,
+            table=inputs,
+            lines_title="All settings, with what was chosen from the data",
+            lines=settings,
+        )
+    ]
+
+
+def _bytes(result: IdentificationResult, origin: Origin | None) -> bytes:
+    return render_report(result, origin).encode(errors="backslashreplace")

@@ -39,6 +39,20 @@ def number(value: float | None, digits: int = 4) -> str:
     return "∞" if math.isinf(value) else f"{value:.{digits}g}"
 
 
+def as_sure(value: float, std: float, digits: int) -> str:
+    """A number with no more digits than it is known by: ``~`` and two where nothing is known."""
+    return number(value, digits) if math.isfinite(std) else f"~{number(value, 2)}"
+
+
+def with_error(value: float | None, std: float | None) -> str:
+    """A number and its standard error; a dash for what is not there."""
+    if value is None:
+        return number(None)
+    if std is None or not math.isfinite(std):
+        return f"~{number(value, 2)}"
+    return f"{number(value, 3)} ± {number(std, 2)}"
+
+
 def percent(value: float | None) -> str:
     """A share in per cent."""
     return "–" if value is None else f"{100.0 * value:.2f} %" if value < 10 else f"{value:.3g} ×"
@@ -98,14 +112,22 @@ def torque_units(robot: Robot) -> str:
 
 
 def link_table(result: IdentificationResult) -> Table:
-    """Mass and centre of mass with standard errors, principal figures of the inertia, and what can be known."""
+    """Mass and centre of mass with standard errors, principal figures of the inertia, and what can be known.
+
+    What the data do not decide is marked by ``~`` and has two digits.
+    """
     rows = []
     for link in result.links():
-        centre = ", ".join(number(round(float(value), MICROMETRES) + 0.0, 3) for value in link.center_of_mass)
-        diagonal = ", ".join(number(float(value), 3) for value in link.inertia[:3])
-        rows.append(
-            (link.name, number(link.mass), number(link.mass_std, 2), centre, diagonal, link.identifiable[0].value)
+        centre = ", ".join(
+            as_sure(round(float(value), MICROMETRES) + 0.0, float(std), 3)
+            for value, std in zip(link.center_of_mass, link.center_of_mass_std, strict=True)
         )
+        diagonal = ", ".join(
+            as_sure(float(value), float(std), 3)
+            for value, std in zip(link.inertia[:3], link.inertia_std[:3], strict=True)
+        )
+        mass = as_sure(link.mass, link.mass_std, 4)
+        rows.append((link.name, mass, number(link.mass_std, 2), centre, diagonal, link.identifiable[0].value))
     header = ("link", "mass [kg]", "± std", "centre of mass [m]", "Ixx, Iyy, Izz at it [kg m²]", "mass identifiable")
     return Table(header, tuple(rows))
 
@@ -132,16 +154,24 @@ def _range(shares: list[float]) -> str:
 
 
 def drive_table(result: IdentificationResult) -> Table:
-    """Friction, offset and armature by joint and coupling; all dry friction as one number."""
-    table, dry = result.drive_parameters(), result.dry_friction()
+    """Friction, offset and armature by joint and coupling, with standard errors; all dry friction as one number."""
+    table, std, dry = result.drive_parameters(), result.drive_std(), result.dry_friction()
+    units: dict[str, set[str]] = {}
+    for parameter in result.regressor.parameters[10 * len(result.robot.links) :]:
+        units.setdefault(parameter.kind, set()).add(parameter.unit)
     there = {kind for row in table.values() for kind, value in row.items() if value is not None}
     others = sorted(kind for kind in there - set(JOINT_KINDS) if not is_dry(kind))
     usual = [kind for kind in JOINT_KINDS if kind in there and kind != Coulomb.kind]
     rows = tuple(
-        (owner, number(dry[owner]), *(number(row.get(kind)) for kind in (*usual, *others)))
+        (
+            owner,
+            number(dry[owner], 3),
+            *(with_error(row.get(kind), std[owner].get(kind)) for kind in (*usual, *others)),
+        )
         for owner, row in table.items()
     )
-    return Table(("joint", "dry", *usual, *others), rows)
+    titles = [f"{kind} [{', '.join(sorted(units.get(kind, {''})))}]" for kind in (*usual, *others)]
+    return Table(("joint", f"dry [{torque_units(result.robot)}]", *titles), rows)
 
 
 def choice_table(result: IdentificationResult) -> Table:

@@ -44,7 +44,7 @@ def body_criteria(result: IdentificationResult) -> Iterator[Criterion]:
 
 def _sizes(result: IdentificationResult) -> Iterator[Criterion]:
     reach = sum(float(np.linalg.norm(joint.placement.translation)) for joint in result.robot.joints)
-    bodies = result.inertial_parameters
+    bodies = result.inertial_parameters.reshape(-1, 10)
     found = mass_properties(bodies)
     outside = []
     for k, link in enumerate(result.robot.links):
