@@ -14,6 +14,7 @@ from casysid.readers.angles import unwrap
 from casysid.readers.batches import all_rows
 from casysid.readers.checks import SampleChecks, check_quaternions, check_steps
 from casysid.readers.columns import Layout, match_columns
+from casysid.readers.generalised import with_generalised_forces
 from casysid.readers.statistics import Statistics
 from casysid.readers.table import Table, open_table
 from casysid.readers.units import check_units
@@ -38,7 +39,7 @@ def load_recording(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]
 
 
 def _load(path: Path, robot: Robot) -> tuple[Recording, tuple[str, ...]]:
-    table = open_table(path)
+    table = with_generalised_forces(open_table(path), robot, str(path))
     layout = match_columns(table.names, robot.channels, robot.dofs, str(path))
     parts: list[dict[str, Array]] = []
 
@@ -62,7 +63,7 @@ def scan_recording(path: Path, robot: Robot) -> tuple[RecordingFile, tuple[str, 
     Raises:
         RecordingError: If it cannot be used.
     """
-    table = open_table(path)
+    table = with_generalised_forces(open_table(path), robot, str(path))
     layout = match_columns(table.names, robot.channels, robot.dofs, str(path))
     version = _version(path)
     statistics = _scan(table, layout, robot, str(path), table.batches(layout.used))
