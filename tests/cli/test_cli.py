@@ -241,7 +241,7 @@ def test_ctrl_c_says_what_was_written(log, monkeypatch, tmp_path):
         raise KeyboardInterrupt
 
     command = ["identify", URDF, log, "--cutoff", "12", "--method", "wls", "--out", tmp_path / "out"]
-    monkeypatch.setattr("casysid.cli.identify._print", interrupt)
+    monkeypatch.setattr("casysid.cli.identify.tell_result", interrupt)
     after = run(*command)
     assert (after.exit_code, after.stderr.split("\n")[-2]) == (
         130,
