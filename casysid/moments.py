@@ -200,15 +200,16 @@ class Moments:
 
     def with_rows_only(self) -> Moments:
         """Without the joints near rest of which there is no row."""
-        return self._with_joints(
+        return self.of_joints(
             [k for k, name in enumerate(self.joints) if self.count[:, k].any() or not name.endswith(NEAR_REST)]
         )
 
     def away_from_rest(self) -> Moments:
         """Without the rows near rest that are kept apart."""
-        return self._with_joints([k for k, name in enumerate(self.joints) if not name.endswith(NEAR_REST)])
+        return self.of_joints([k for k, name in enumerate(self.joints) if not name.endswith(NEAR_REST)])
 
-    def _with_joints(self, kept: list[int]) -> Moments:
+    def of_joints(self, kept: list[int]) -> Moments:
+        """The rows of some joints only, by their places."""
         return dataclasses.replace(
             self,
             squares=tuple(self.squares[k] for k in kept),

@@ -10,6 +10,7 @@ import typer
 from casysid.cli.bug_report import INTERNAL_FAULT, describe_fault
 from casysid.cli.compare import compare
 from casysid.cli.excite import excite
+from casysid.cli.gravity import CommandWithGravity
 from casysid.cli.identify import identify
 from casysid.cli.info import info
 from casysid.cli.payload import payload
@@ -29,7 +30,7 @@ app = typer.Typer(
         "a controller can trust."
     ),
     epilog="Exit codes: 0 done, 1 a solver failed but the result was written, 2 bad input or no place to write to, "
-    "70 a fault of casysid, 130 interrupted.",
+    "3 what was identified is doubtful, 4 it is rejected, 70 a fault of casysid, 130 interrupted.",
     pretty_exceptions_enable=False,
 )
 
@@ -52,8 +53,9 @@ def _root(
 
 
 app.command(
+    cls=CommandWithGravity,
     epilog="Examples: casysid identify arm.urdf excite.csv --split 0.6 --out identified  ·  "
-    "casysid identify arm.xml run1.csv run2.parquet --held-out run3.csv"
+    "casysid identify arm.xml run1.csv run2.parquet --held-out run3.csv",
 )(identify)
 app.command(epilog="Example: casysid compare arm.urdf excite.csv --split 0.6 --methods wls,ridge,lasso")(compare)
 app.command(

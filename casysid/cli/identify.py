@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from casysid.cli.gravity import in_its_gravity, is_auto
 from casysid.cli.known_facts import KeepOption, LinkMassOption, TotalMassOption, known_facts
 from casysid.cli.log_options import (
     ConstantOption,
@@ -46,6 +47,7 @@ from casysid.cli.options import (
     noise_levels,
 )
 from casysid.cli.ranges import check_options
+from casysid.errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -54,6 +56,7 @@ if TYPE_CHECKING:
 
     from casysid.identification import IdentificationResult, Settings
     from casysid.identification.many import Fleet
+    from casysid.identification.verdict import Word
     from casysid.recording import Declared
     from casysid.robot import Robot
 
@@ -63,6 +66,7 @@ FILES = (
     *("model.json", "model.npz", "moments.npz", "report.html"),
     *("fleet.json", "fleet.csv"),
 )
+STYLES = {"accepted": "bold green", "doubtful": "bold yellow", "rejected": "bold red"}
 SMALLEST_RUN = 2**15
 """Less than any run takes: that of two joints, without a choice of the low-pass, takes 108 kB [bytes]."""
 
@@ -103,8 +107,12 @@ def identify(
         "identified"
     ),
 ) -> None:
-    """Identify the inertial and friction parameters of ROBOT from recordings."""
-    from casysid.cli.console import SOLVER_FAILED, progress_bar, rich_table, speaking, tell_path
+    """Identify the inertial and friction parameters of ROBOT from recordings.
+
+    Exit codes: 0 accepted, 3 doubtful (usable for some purposes; reasons are told), 4 rejected; 1 the solver failed,
+    2 bad input.
+    """
+    from casysid.cli.console import SOLVER_FAILED, progress_bar, rich_table, say, speaking, tell_path
 
     with speaking() as console:
         from casysid.estimation import Status
@@ -120,11 +128,18 @@ def identify(
         noise = noise_levels(noise_position, noise_velocity, noise_acceleration)
         settings = make_settings(method, consistency, cutoff, coupling, time_scale, delay, noise, friction, flip)
         said = declared_of(units, columns, motor_constant, gear, efficiency)
-        model = load_robot(robot, gravity, lock, floating_base)
+        model = load_robot(robot, None if is_auto(gravity) else gravity, lock, floating_base)
         settings = dataclasses.replace(settings, knowledge=known_facts(model, mass_total, mass, keep))
         many = scheduler is not None or by is not None or any(map(holds_logs, logs))
         fitted, unseen = ([], []) if many else load_recordings(model, logs, held_out, split, said)
         fleet = None
+        if is_auto(gravity):
+            if many:
+                raise ParameterError(
+                    "--gravity auto looks at logs named one by one; give the vector for folders of them"
+                )
+            model, found = in_its_gravity(model, fitted)
+            say(console, found)
         with progress_bar(console) as progress:
             if many:
                 result, fleet = _run_many(model, logs, settings, held_out, split, said, scheduler, by, progress)
@@ -138,12 +153,11 @@ def identify(
                 )
                 if fleet is not None:
                     add_fleet(fleet, stage)
-        tell_result(console, result, notes)
+        word = tell_result(console, result, notes)
         if fleet is not None:
             console.print(rich_table("Differences between machines", *fleet_rows(fleet)))
         tell_path(out / "result.json")
-    if result.status is not Status.CONVERGED:
-        sys.exit(SOLVER_FAILED)
+    sys.exit(word.exit_code if result.status is Status.CONVERGED else SOLVER_FAILED)
 
 
 def _run_many(
@@ -170,7 +184,7 @@ def _run_many(
     return fleet.pooled, fleet
 
 
-def tell_result(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> None:
+def tell_result(console: Console, result: IdentificationResult, notes: tuple[str, ...]) -> Word:
     """The tables, the verdict, and what else a person should know."""
     from casysid.cli.console import rich_table, say
     from casysid.identification.verdict import judge
@@ -188,7 +202,8 @@ def tell_result(console: Console, result: IdentificationResult, notes: tuple[str
         console.print(rich_table("Noise of the measured motion", noise.header, noise.rows))
         console.print()
     verdict = judge(result)
-    say(console, verdict.headline, style="bold green" if verdict.accepted else "bold red")
+    say(console, verdict.headline, style=STYLES[verdict.headline])
     friction = [one.sentence for one in result.friction.chosen]
     for line in (*verdict.reasons, *verdict.remarks, *friction, *notes):
         say(console, f"  · {line}")
+    return verdict.word

@@ -42,6 +42,7 @@ def info(
 
         from casysid.cli.console import printable, rich_table
         from casysid.recording import draft_map, is_log, open_recording
+        from casysid.recording.held_joints import warn_of_held_joints
         from casysid.report.overview import recording_tables, robot_tables
 
         said = declared_of(units, columns, motor_constant, gear, efficiency)
@@ -56,6 +57,7 @@ def info(
         if log is not None:
             recording = open_recording(log, model, said)
             tables += recording_tables(model, recording)
+            warn_of_held_joints([log], model)
         for title, table in tables:
             console.print(rich_table(title, table.header, table.rows))
             console.print()

@@ -109,7 +109,11 @@ FrictionOption = Annotated[
 ]
 GravityOption = Annotated[
     tuple[float, float, float] | None,
-    typer.Option("--gravity", metavar="X Y Z", help="Gravity in the base frame [m/s²]; default: the model's."),
+    typer.Option(
+        "--gravity",
+        metavar="X Y Z",
+        help="Gravity in the base frame [m/s²]; default: the model's. identify takes auto too: what the log asks for.",
+    ),
 ]
 LockOption = Annotated[
     list[str] | None, typer.Option("--lock", metavar="JOINT=VALUE", help="Hold a joint fixed [rad or m]. Repeatable.")
@@ -137,12 +141,14 @@ def load_recordings(
     """The fitted and the held-out recordings."""
     from casysid.identification.passes import is_long
     from casysid.recording import Source, open_recordings
+    from casysid.recording.held_joints import warn_of_held_joints
 
     check_options(split=split)
     fitted, unseen = list[Source](), list[Source]()
     for files, several in ((logs, fitted), (held_out or [], unseen)):
         opened = open_recordings(files, robot, declared)
         several += opened if is_long(opened) else [one.in_memory() for one in opened]
+        warn_of_held_joints(files, robot)
     if split is None:
         return fitted, unseen
     halves = [recording.split(split) for recording in fitted]

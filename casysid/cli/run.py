@@ -15,7 +15,10 @@ def run(
     ],
     out: Annotated[Path | None, typer.Option(help="Folder to write to instead of the file's.")] = None,
 ) -> None:
-    """Carry out the experiment that a TOML file describes; beside the result is the file as it was run."""
+    """Carry out the experiment that a TOML file describes; beside the result is the file as it was run.
+
+    Exit codes as of identify.
+    """
     from casysid.cli.console import SOLVER_FAILED, progress_bar, rich_table, speaking, tell_path
 
     with speaking() as console:
@@ -34,10 +37,9 @@ def run(
         check_run_folder(asked.outputs["folder"], FILES, SMALLEST_RUN)
         with progress_bar(console) as progress:
             outcome = run_experiment(asked, progress=progress, folder=console.run_folder)
-        tell_result(console, outcome.result, outcome.notes)
+        word = tell_result(console, outcome.result, outcome.notes)
         for title, table in payload_tables(outcome.payloads) if outcome.payloads else []:
             console.print(rich_table(title, table.header, table.rows))
             console.print()
         tell_path(outcome.folder / EXPERIMENT_FILE)
-    if outcome.result.status is not Status.CONVERGED:
-        sys.exit(SOLVER_FAILED)
+    sys.exit(word.exit_code if outcome.result.status is Status.CONVERGED else SOLVER_FAILED)

@@ -39,10 +39,9 @@ def write_result(
 def add_result(result: IdentificationResult, stage: Stage, *, export_inconsistent: bool = False) -> tuple[str, ...]:
     """Write what :func:`write_result` writes to where a run's files wait; returns what it returns."""
     notes = _write_model(result, stage, export_inconsistent)
-    verdict = judge(result)
     content = {
         **result.to_json(),
-        "verdict": {"accepted": verdict.accepted, "reasons": list(verdict.reasons), "remarks": list(verdict.remarks)},
+        "verdict": judge(result).to_json(),
         "model_notes": list(notes),
     }
     write_moments(result.moments, stage.folder / "moments.npz")

@@ -15,6 +15,7 @@ from casysid.dynamics import JointUse, Regressor
 from casysid.errors import CasysidWarning, RecordingError
 from casysid.estimation import Estimate
 from casysid.identifiability import BaseParameters, excited_base_parameters, structural_base_parameters
+from casysid.identification.aside import gains_of_the_rest
 from casysid.identification.choices import Choices
 from casysid.identification.friction_laws import friction_laws
 from casysid.identification.mistakes import find_mistakes
@@ -22,12 +23,12 @@ from casysid.identification.noise_moments import with_noise
 from casysid.identification.order import as_given, places_by_content
 from casysid.identification.passes import Mapped, Passes, excerpts, is_long
 from casysid.identification.result import IdentificationResult
+from casysid.identification.sameness import check_sameness
 from casysid.identification.settings import Settings
 from casysid.identification.tuning.band import BandChoice, choose_band
 from casysid.identification.tuning.candidates import Candidates, final_regressor, gather_candidates, moments_of
 from casysid.identification.tuning.clock import choose_clock
 from casysid.identification.tuning.delay import choose_delay
-from casysid.identification.tuning.drive_gains import choose_drive_gains
 from casysid.identification.tuning.friction_selection import FrictionChoice, fit_model, select_friction
 from casysid.identification.tuning.ripples import ripple_uses
 from casysid.moments import Moments
@@ -102,7 +103,7 @@ def identify(
     """Identify a robot's parameters from recordings.
 
     Args:
-        robot: The robot; its own parameters are the prior.
+        robot: The robot; its own parameters are the prior, where they are those of a body (:func:`believed`).
         recordings: What is fitted.
         settings: Hyperparameters; the defaults let the data decide.
         held_out: Recordings that are only predicted.
@@ -148,6 +149,7 @@ def prepare(
             several, cutoff=settings.cutoff, time_scale=settings.time_scale, delay=settings.delay, fewest=fewest
         )
     check_noise(fitted, settings.input_noise)
+    check_sameness(fitted, held_out)
     clock = _Clock()
     fitted, held_out = (tuple(one.flipped(settings.flip) for one in several) for several in (fitted, held_out))
     places = places_by_content(fitted)
@@ -324,9 +326,7 @@ def _choose(
     friction = select_friction(candidates, settings, usual) if usual else FrictionChoice(settings)
     regressor = final_regressor(candidates, settings, [proposal for proposal, _ in friction.taken])
     moments = moments_of(regressor, candidates, friction.taken)
-    gains = choose_drive_gains(
-        moments, regressor.parameters, settings.consistency, settings.knowledge, settings.torque_gains
-    )
+    gains = gains_of_the_rest(moments, regressor, settings)
     if gains.found:
         warnings.warn(gains.reason, CasysidWarning, stacklevel=4)
         settings = dataclasses.replace(settings, torque_gains=tuple(gains.values.tolist()))

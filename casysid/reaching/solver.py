@@ -30,7 +30,9 @@ CLEAR_STARTS = 12
 SLACK = 1e-6
 """A distance that is short by less [m] is kept: tolerance."""
 PATIENCE = 10
-"""Times the steps of a start, for the best of all that do not arrive: effort."""
+"""Times the steps of a start, for the nearest of all that do not arrive: effort."""
+NEAREST = 8
+"""Of these, which are followed to where nothing gets nearer: effort."""
 
 
 class InverseKinematics:
@@ -62,19 +64,18 @@ class InverseKinematics:
             ParameterError: No targets, no such frame, or a start that is no configuration.
         """
         began, problem = time.perf_counter(), self._problem(targets)
-        best: Descent | None = None
-        tried = steps = 0
+        ends: list[Descent] = []
         for q in islice(self._starts(problem, start), self.settings.starts):
-            found = self._descend(problem, q)
-            tried, steps = tried + 1, steps + found.steps
-            if best is None or found.is_there or found.at.cost < best.at.cost:
-                best = found
-            if found.is_there:
+            ends.append(self._descend(problem, q))
+            if ends[-1].is_there:
                 break
-        assert best is not None  # there is at least one start
+        tried, best = len(ends), ends[-1]
         if not best.is_there:
-            best = descend(problem, best.q, self.settings.tolerance, PATIENCE * self.settings.steps, patient=True)
-            steps += best.steps
+            most = PATIENCE * self.settings.steps
+            near = sorted(ends, key=lambda end: end.at.cost)[:NEAREST]
+            ends += [descend(problem, end.q, self.settings.tolerance, most, patient=True) for end in near]
+            best = min(ends, key=lambda end: end.at.cost)
+        steps = sum(end.steps for end in ends)
         status = ReachStatus.REACHED if best.is_there else ReachStatus.NEAREST
         return self._reach(best, status, tried, steps, time.perf_counter() - began)
 

@@ -1,8 +1,8 @@
 """Which column of a log is which channel of the robot.
 
-By joint (``q_elbow, tau_elbow``) or numbered in the model's order, from 1 or from 0 (``q1, dq1, ddq1, tau1``; ``q_1``
-too, and plain ``q`` for a single one), never both. Of these spellings the first that the file has counts, and the
-others are left aside.
+By joint (``q_elbow, tau_elbow``) or numbered in the model file's order, from 1 or from 0 (``q1, dq1, ddq1, tau1``;
+``q_1`` too, and plain ``q`` for a single one), never both. Of these spellings the first that the file has counts, and
+the others are left aside.
 
 ============ ============================== ==========================
 quantity     by name, ``<spelling>_<name>`` by number, ``<spelling>1``
@@ -23,7 +23,7 @@ for the rest: the joint's name when it moves in one way.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NoReturn
 
 from casysid.errors import RecordingError
@@ -122,6 +122,7 @@ def match_columns(
     labels: Labels | None = None,
     declared: Declared = NOTHING,
     linear: Collection[str] = (),
+    numbered: tuple[Sequence[str], Sequence[str]] | None = None,
 ) -> Layout:
     """The layout of a file with the columns ``found``, for a robot with these channels and degrees of freedom.
 
@@ -133,6 +134,7 @@ def match_columns(
         labels: What the log says of its columns beside their names.
         declared: What its user says; no columns.
         linear: Channels and degrees of freedom that are lengths.
+        numbered: The channels and the degrees of freedom in the order that numbers count; None is theirs.
 
     Raises:
         RecordingError: If a wanted column is missing, there twice or once too often, names and numbers are mixed, two
@@ -157,17 +159,38 @@ def match_columns(
     for one in picked:
         if one.doubled:
             raise same_number(one.quantity, one.doubled[0], one.columns, source)
+    position, *others = (in_own_order(one, channels, dofs, numbered) for one in picked)
+    by_word = {one.quantity: one.columns for one in others}
+    picked = [position, *others]
     layout = Layout(
         clock=find_clock(found, names.labels.units, position.columns[0]),
         position=position.columns,
-        velocity=None if velocity is None else velocity.columns,
-        acceleration=None if acceleration is None else acceleration.columns,
-        torque=torque.columns,
+        velocity=by_word.get("velocity"),
+        acceleration=by_word.get("acceleration"),
+        torque=others[-1].columns,
         factors=factors_of(picked, channels, dofs, names.labels, declared, set(linear), source),
         remarks=only_commanded(picked),
     )
     refuse_unusable(layout, found, source)
     return layout
+
+
+def in_own_order(
+    candidate: Candidate,
+    channels: Sequence[str],
+    dofs: Sequence[str],
+    numbered: tuple[Sequence[str], Sequence[str]] | None,
+) -> Candidate:
+    """Numbered columns, put from the order in which numbers count into the robot's."""
+    if candidate.named or numbered is None:
+        return candidate
+    own, counted = (channels, numbered[0]) if candidate.quantity == POSITION.word else (dofs, numbered[1])
+    places = [list(counted).index(name) for name in own]
+    return replace(
+        candidate,
+        columns=tuple(candidate.columns[place] for place in places),
+        units=tuple(candidate.units[place] for place in places),
+    )
 
 
 _WORDS = ("position", "velocity", "acceleration", "torque", "current")

@@ -15,6 +15,7 @@ from casysid.readers.angles import unwrap
 from casysid.readers.checks import SampleChecks, check_quaternions, check_steps
 from casysid.readers.columns import Layout
 from casysid.readers.faults import decided_unit, emptied, glitches_of, too_fast
+from casysid.readers.generalised import with_generalised_forces
 from casysid.readers.mapping import lay_out, text_of_map
 from casysid.readers.repairs import Columns, together
 from casysid.readers.samples import Samples
@@ -173,10 +174,13 @@ def _scan(path: Path, robot: Robot, declared: Declared, parts: list[Columns] | N
     Raises:
         RecordingError: If it cannot be used.
     """
-    table, source = open_table(path), str(path)
+    source = str(path)
+    table = with_generalised_forces(open_table(path), robot, source)
     if table.nameless and not declared.columns:
         raise RecordingError(table.nameless)
-    layout = lay_out(table.names, robot.channels, robot.dofs, source, table.labels, declared, _lengths(robot))
+    layout = lay_out(
+        table.names, robot.channels, robot.dofs, source, table.labels, declared, _lengths(robot), robot.numbered
+    )
     samples = Samples(table, layout).with_clock_started()
     samples.check_curves(source)
     remarks = list(layout.remarks)

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from casysid.errors import RecordingError
 from casysid.readers.candidates import Candidate, Labels
 from casysid.readers.clock import Clock, find_clock
-from casysid.readers.columns import Layout, match_columns, refuse_unusable
+from casysid.readers.columns import Layout, in_own_order, match_columns, refuse_unusable
 from casysid.readers.messages import listing
 from casysid.readers.scaling import factors_of, is_length
 from casysid.readers.units_of_columns import UNITS, canonical
@@ -24,6 +24,7 @@ def lay_out(
     labels: Labels,
     declared: Declared,
     linear: Collection[str],
+    numbered: tuple[Sequence[str], Sequence[str]] | None = None,
 ) -> Layout:
     """The layout that a map gives, or else that of the names; see :func:`~casysid.readers.columns.match_columns`.
 
@@ -31,14 +32,15 @@ def lay_out(
         RecordingError: The columns of the map are not there, or not one for each joint; or as that function says.
     """
     if not declared.columns.keys() - {"time"}:
-        layout = match_columns(found, channels, dofs, source, labels, declared, linear)
+        layout = match_columns(found, channels, dofs, source, labels, declared, linear, numbered)
         clock = _clock(declared, found, labels, source, layout.clock)
         return Layout(**(vars(layout) | {"clock": clock}))
     chosen = {}
     for quantity, columns in declared.columns.items():
         if quantity != "time":
             names = channels if quantity == "position" else dofs
-            chosen[quantity] = _mapped(quantity, columns, names, found, source)
+            mapped = _mapped(quantity, columns, names, found, source)
+            chosen[quantity] = in_own_order(mapped, channels, dofs, numbered)
     for quantity in ("position", "torque"):
         if quantity not in chosen:
             raise RecordingError(
@@ -57,9 +59,11 @@ def lay_out(
 
 
 def _mapped(quantity: str, said: object, names: Sequence[str], found: Sequence[str], source: str) -> Candidate:
+    named = isinstance(said, (str, Mapping))
     if isinstance(said, str):
         columns = [said.replace(SLOT, name) for name in names]
         if SLOT in said and not set(columns) <= set(found):
+            named = False
             columns = next(
                 (
                     numbered
@@ -90,7 +94,8 @@ def _mapped(quantity: str, said: object, names: Sequence[str], found: Sequence[s
             f"{source}: the map takes {quantity} from {listing(lacking, 8)}, which the log does not have. "
             f"Found: {listing(found)}"
         )
-    return Candidate(quantity, tuple(columns), tuple(without_unit(column)[1] for column in columns))
+    units = tuple(without_unit(column)[1] for column in columns)
+    return Candidate(quantity, tuple(columns), units, named=named)
 
 
 def _clock(declared: Declared, found: Sequence[str], labels: Labels, source: str, own: Clock | None) -> Clock | None:
@@ -123,7 +128,7 @@ def text_of_map(
     layout: Layout, channels: Sequence[str], dofs: Sequence[str], declared: Declared, linear: Collection[str]
 ) -> str:
     """The map that a layout follows, as the text of a file that can be edited and given to ``--map``."""
-    lines = ["# columns of the log; * stands for the joint, a list is in the order of the model's joints"]
+    lines = ["# columns of the log; * stands for the joint, a list is in the order of joints in the model file"]
     units: dict[str, str] = {}
     if layout.clock is not None:
         clock = layout.clock.columns
@@ -150,12 +155,12 @@ def text_of_map(
     return "\n".join(lines) + "\n"
 
 
-def _short(columns: Sequence[str], names: Sequence[str]) -> str | list[str]:
+def _short(columns: Sequence[str], names: Sequence[str]) -> str | dict[str, str]:
     if names[0] in columns[0]:
         pattern = SLOT.join(columns[0].rsplit(names[0], 1))
         if [pattern.replace(SLOT, name) for name in names] == list(columns):
             return pattern
-    return list(columns)
+    return dict(zip(names, columns, strict=True))
 
 
 def _units(

@@ -1,4 +1,4 @@
-"""NumPy archives: arrays named as columns, or matrices q, v, a, tau with a column a channel in the model's order."""
+"""NumPy archives: arrays named as columns, or matrices q, v, a, tau with columns in the model file's order."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from casysid.arrays import Array
+from casysid.readers.angles import NEAR, TURN
 
 ROW = "\0row"
 """Key of the rows' places in the file, which travel with them."""
@@ -39,18 +40,26 @@ class Glitches:
     turns: tuple[str, ...]
     torque: dict[str, float]
 
-    def found(self, columns: Columns, time: str) -> Mask:
-        """Which rows but the first and the last are glitches, shape (N - 2,)."""
+    def first(self, columns: Columns, time: str) -> bool:
+        """Whether the first row of a log is a glitch: some position leaps from it, and stays where it is then."""
+        start = taken(columns, slice(0, 3))
+        return any(leap[0] and not leap[1] for _, leap in self._leaps(start, time) if len(leap) == 2)
+
+    def _leaps(self, columns: Columns, time: str) -> Iterator[tuple[Array, Mask]]:
+        """Steps of each position, and which of them no joint makes."""
         step = np.diff(columns[time])
-        bad = np.zeros(max(len(step) - 1, 0), dtype=np.bool_)
         for name, speed in self.speed.items():
             change = np.diff(columns[name])
             size = np.abs(change)
-            if size.max(initial=0.0) <= self.step:
-                continue
-            leap = (size > speed * step) & (size > self.step)
-            if name in self.turns:
-                leap &= np.abs(size - 2.0 * np.pi) > 0.5
+            if size.max(initial=0.0) > self.step:
+                leap = (size > speed * step) & (size > self.step)
+                yield change, leap & (np.abs(size - TURN) > NEAR) if name in self.turns else leap
+
+    def found(self, columns: Columns, time: str) -> Mask:
+        """Which rows but the first and the last are glitches, shape (N - 2,)."""
+        bad = np.zeros(max(len(columns[time]) - 2, 0), dtype=np.bool_)
+        for change, leap in self._leaps(columns, time):
+            size = np.abs(change)
             across = np.abs(change[1:] + change[:-1])
             returns = (change[1:] * change[:-1] < 0.0) & (across < 0.5 * np.minimum(size[1:], size[:-1]))
             bad |= leap[1:] & leap[:-1] & returns
@@ -100,7 +109,9 @@ class Repairs:
             batches = _unheld(batches, time, self.held)
         if time is not None and self.glitches is not None:
             glitches = self.glitches
-            batches = _without(batches, lambda columns: glitches.found(columns, time))
+            batches = _without(
+                batches, lambda columns: glitches.found(columns, time), lambda columns: glitches.first(columns, time)
+            )
         return batches
 
 
@@ -153,21 +164,24 @@ def _selected(batches: Iterator[Columns], keep: Callable[[Columns], Mask]) -> It
         yield columns if good.all() else taken(columns, good)
 
 
-def _without(batches: Iterator[Columns], inner: Callable[[Columns], Mask]) -> Iterator[Columns]:
-    """Without rows that ``inner`` finds between a first and a last one."""
+def _without(
+    batches: Iterator[Columns],
+    inner: Callable[[Columns], Mask],
+    first: Callable[[Columns], bool] = lambda columns: False,
+) -> Iterator[Columns]:
+    """Without rows that ``inner`` finds between a first and a last one, and without the first of all if it is bad."""
     held: Columns | None = None
     start = True
     for columns in batches:
-        if not len(columns[ROW]):
-            continue
         joined = columns if held is None else together([held, columns])
-        bad = inner(joined)
-        keep = np.concatenate([[start], ~bad, [False]]) if len(joined[ROW]) > 1 else np.zeros(1, dtype=np.bool_)
-        yield taken(joined, keep)
-        start = start and len(joined[ROW]) < 2
-        held = taken(joined, slice(-2, None))
+        if start and len(joined[ROW]) < 3:
+            held = joined
+            continue
+        if len(columns[ROW]):
+            yield taken(joined, np.concatenate([[start and not first(joined)], ~inner(joined), [False]]))
+            start, held = False, taken(joined, slice(-2, None))
     if held is not None:
-        yield taken(held, slice(-1, None))
+        yield held if start else taken(held, slice(-1, None))
 
 
 def _sorted(batches: Iterator[Columns], time: str) -> Iterator[Columns]:

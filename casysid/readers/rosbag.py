@@ -14,11 +14,12 @@ from casysid.errors import MissingExtraError, RecordingError
 from casysid.readers.batches import Batch, from_row
 from casysid.readers.candidates import Labels
 from casysid.readers.messages import listing, refuse_too_many
-from casysid.recording.source import BATCH
 
 MESSAGE = "sensor_msgs/msg/JointState"
 STAMP = "header.stamp"
 LISTS = ("position", "velocity", "effort")
+ROWS = 1 << 13
+"""Messages that are kept in memory; as lists of Python they take ten times the room of an array."""
 LOOKED_AT = 100
 """Messages of each topic that tell its joints: several publishers may share one."""
 
@@ -73,7 +74,7 @@ class BagTable:
                 stamp = _nanoseconds(message.header.stamp)
                 stamps.append(stamp or received)
                 rows.append(_row(topic, message, wanted))
-                if len(rows) == BATCH:
+                if len(rows) == ROWS:
                     yield self._together(names, stamps, rows)
                     stamps, rows = [], []
         if rows:

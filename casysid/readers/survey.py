@@ -112,6 +112,7 @@ class Survey:
         self.stray += int(np.count_nonzero(stray_stamps(stamps, WINDOW * self.step))) if self.step else 0
         if not (steps < 0.0).any():
             self.glitched += int(np.count_nonzero(self._glitches.found(joined, time)))
+            self.glitched += len(joined[ROW]) == len(columns[ROW]) and self._glitches.first(joined, time)
             return
         order = np.argsort(stamps, kind="stable")
         places = np.empty(len(order), dtype=np.intp)

@@ -56,14 +56,15 @@ def _check_degrees_by_velocity(statistics: Statistics, robot: Robot) -> None:
             position.append(joint.name)
         if correlation > 0.9 and abs(ratio * DEGREE - 1.0) < 0.1:
             velocity.append(joint.name)
-    for names, word, other, unit in (
-        (position, "q", "v", "rad"),
-        (velocity, "v", "q", "rad/s"),
+    for names, word, other, unit, quantity, per in (
+        (position, "q", "v", "rad", "position", ""),
+        (velocity, "v", "q", "rad/s", "velocity", "/s"),
     ):
         if names:
             raise RecordingError(
                 f"{statistics.label}: {word} looks like degrees for {listing(names)}: "
-                f"it is 57.3 times what {other} makes of it. Convert it to {unit} (times pi/180)"
+                f"it is 57.3 times what {other} makes of it. "
+                f"Say --units {quantity}=deg{per}, or convert it to {unit} (times pi/180)"
             )
 
 
@@ -82,6 +83,6 @@ def _check_degrees_by_limits(statistics: Statistics, robot: Robot) -> None:
     if far:
         raise RecordingError(
             f"{statistics.label}: q looks like degrees: {listing(far, 4)}; "
-            "as degrees every joint would be within its limits. Convert q, v and a to radians (times pi/180), "
+            "as degrees every joint would be within its limits. Say --units position=deg, convert q, v, a to radians, "
             "or correct the model's limits"
         )

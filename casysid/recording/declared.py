@@ -25,8 +25,8 @@ class Declared:
     Attributes:
         units: By quantity (time, position, velocity, acceleration, torque), such as ``("deg",)``; one for angles and
             one for lengths may stand side by side.
-        columns: By quantity: names with ``*`` for the joint, a list in the robot's order, or a table by joint; of time
-            one name, or those of seconds and their fraction.
+        columns: By quantity: names with ``*`` for the joint, a list in the model file's order, or a table by joint; of
+            time one name, or those of seconds and their fraction.
         motor_constant: The torque columns hold motor currents [A]; torque is current times this [N m/A], one for all
             joints or by joint.
         gear: The torque columns hold torques, or currents, of motors; joints have so many times the torque.

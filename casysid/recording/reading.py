@@ -17,7 +17,7 @@ def read_recording(path: str | Path, robot: Robot, declared: Declared = NOTHING)
     """The recording in a CSV (plain or gzipped), Parquet or NPZ file.
 
     Columns are ``time`` [s], then by joint name ``q_<joint>, v_<joint>, a_<joint>, tau_<joint>``, or numbered
-    ``q1, dq1, ddq1, tau1`` in the model's order; :mod:`casysid.readers.columns` has the other spellings. SI units.
+    ``q1, dq1, ddq1, tau1`` in the model file's order; :mod:`casysid.readers.columns` has the other spellings. SI units.
     Only q and tau are needed beside time; without time the rows are unordered samples, and need all four. Other columns
     are left aside.
 

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from casysid.arrays import Array, frozen
 from casysid.errors import ParameterError, RobotError
-from casysid.robot.checks import InertiaFault
+from casysid.robot.checks import InertiaFault, check_gravity
 from casysid.robot.model import Joint, JointKind, Robot, SourceFormat
 
 ROOT_JOINT = "root_joint"  # Pinocchio's name for the free joint under a floating base
@@ -49,6 +49,7 @@ def assemble_robot(
     faults: Sequence[InertiaFault] = (),
     floating_base: bool = False,
     locked: Sequence[tuple[str, float]] = (),
+    file_order: Sequence[str] = (),
 ) -> Robot:
     """The robot of a model that is its own from here on.
 
@@ -61,6 +62,7 @@ def assemble_robot(
         faults: Complaints about the file's inertial parameters.
         floating_base: Whether a free joint was added.
         locked: Joints that were held.
+        file_order: Names of joints in the file, in its order; those that do not move are left out.
 
     Raises:
         RobotError: There is no joint, or one of an unknown kind.
@@ -89,7 +91,22 @@ def assemble_robot(
         faults=tuple(faults),
         floating_base=floating_base,
         locked=tuple(locked),
+        file_order=_order_of(file_order, [joint.name for joint in joints]),
     )
+
+
+def _order_of(file_order: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """The file's order of the joints that move, those that it does not have first; empty where it is theirs."""
+    moving = set(names)
+    order = (*(name for name in names if name not in set(file_order)), *(x for x in file_order if x in moving))
+    return () if order == tuple(names) else order
+
+
+def replace_gravity(robot: Robot, gravity: npt.ArrayLike) -> Robot:
+    """See :meth:`Robot.with_gravity`."""
+    model = robot.model.copy()
+    model.gravity.linear = check_gravity(gravity)
+    return dataclasses.replace(robot, model=model, gravity=frozen(model.gravity.linear))
 
 
 def replace_parameters(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ import pinocchio as pin
 
 from casysid.errors import RobotError
 from casysid.robot.limits import LARGEST
+
+_NUMBERED = "\x1f"  # parts a frame's number from its name; no XML text can hold it
 
 
 def lockable_values(
@@ -37,6 +40,11 @@ def lockable_values(
     return tuple(held)
 
 
+def lock_words(positions: Mapping[str, float]) -> str:
+    """What to write on the command line to lock joints, ready to copy."""
+    return " ".join(f"--lock {shlex.quote(f'{name}={value:g}')}" for name, value in positions.items())
+
+
 def lock_joints(model: Any, held: Sequence[tuple[str, float]], source: Path) -> Any:
     """The ``pin.Model`` without the held joints.
 
@@ -52,4 +60,17 @@ def lock_joints(model: Any, held: Sequence[tuple[str, float]], source: Path) -> 
             raise RobotError(f"{source}: joint '{name}' cannot be locked: only joints with one degree of freedom can")
         values = [position] if joint.nq == 1 else [math.cos(position), math.sin(position)]
         configuration[joint.idx_q : joint.idx_q + joint.nq] = values
-    return pin.buildReducedModel(model, [model.getJointId(name) for name, _ in held], configuration)
+    numbered = _with_frames_numbered(model)
+    reduced = pin.buildReducedModel(numbered, [model.getJointId(name) for name, _ in held], configuration)
+    for frame in reduced.frames:
+        frame.name = frame.name.partition(_NUMBERED)[2] or frame.name
+    return reduced
+
+
+def _with_frames_numbered(model: Any) -> Any:
+    """The model with names of frames that are unique: Pinocchio looks for those of links and fixed joints by name."""
+    numbered = model.copy()
+    for k, frame in enumerate(numbered.frames):
+        if frame.type != pin.FrameType.JOINT and k > 0:
+            frame.name = f"{k}{_NUMBERED}{frame.name}"
+    return numbered

@@ -19,6 +19,7 @@ from casysid.robot.checks import InertiaFault, check_gravity, check_inertia, neg
 from casysid.robot.limits import check_expansion, check_numbers, check_parts
 from casysid.robot.locking import lock_joints, lockable_values
 from casysid.robot.mjcf_actuators import scalar_joint_of_actuator
+from casysid.robot.mjcf_loops import check_loops, loose_bodies
 from casysid.robot.mjcf_tree import body_names, build_pin_model, find_free_root, joint_names
 from casysid.robot.model import Robot
 from casysid.robot.mujoco_warnings import collected_warnings
@@ -45,12 +46,18 @@ def read_mjcf(
     _check_text(root, path)
     spec, compiled, messages = compile_mjcf(path)
     _check_compiled(compiled, path)
-    free_root = find_free_root(compiled, path) if floating_base else None
-    held = lockable_values(locked, joint_names(compiled), path)
+    loose = loose_bodies(compiled)
+    free_root = find_free_root(compiled, path, loose) if floating_base else None
+    asked = lockable_values(locked, joint_names(compiled), path)
+    loose_joints = {joint_names(compiled)[compiled.body_jntadr[b]] for b in loose if compiled.body_jntnum[b]}
+    held = tuple((name, value) for name, value in asked if name not in loose_joints)
     locked_names = {name for name, _ in held}
-    _refuse_loops(compiled, locked_names, path)
+    left_out = check_loops(compiled, locked_names, loose, path)
+    if loose:
+        named = ", ".join(f"'{body_names(compiled)[b]}'" for b in sorted(loose))
+        left_out.append(f"bodies of the scene that float beside the robot: {named}")
     try:
-        full = build_pin_model(compiled, free_root=free_root)
+        full = build_pin_model(compiled, free_root=free_root, left_out=loose)
     except (ValueError, RuntimeError) as error:
         raise RobotError(f"{path}: Pinocchio cannot build the model: {error}") from error
     full.gravity.linear = check_gravity(_gravity(compiled) if gravity is None else gravity)
@@ -70,6 +77,8 @@ def read_mjcf(
     )
     for message in messages:
         warnings.warn(f"{path}: MuJoCo: {message}", CasysidWarning, stacklevel=stacklevel)
+    if left_out:
+        warnings.warn(f"{path}: left out: {'; '.join(left_out)}", CasysidWarning, stacklevel=stacklevel)
     _warn_of_extras(compiled, path, stacklevel=stacklevel)
     _warn_of_negatives(robot, path, stacklevel=stacklevel)
     warn_of_faults(path, faults, stacklevel=stacklevel)
@@ -157,10 +166,11 @@ def compile_mjcf(path: Path) -> tuple[Any, Any, list[str]]:
 
 def _parse(path: Path) -> Any:
     """The ``MjSpec``; MuJoCo itself opens no file by another suffix than ``.xml``."""
-    if path.suffix == ".xml":
+    text = read_bytes(path)
+    if path.suffix == ".xml" and text == path.read_bytes():
         spec = mujoco.MjSpec.from_file(str(path))
     else:
-        spec = mujoco.MjSpec.from_string(path.read_text(encoding="utf-8"))
+        spec = mujoco.MjSpec.from_string(text.decode("utf-8"))
         spec.modelfiledir = f"{path.parent}{os.sep}"
     spec.compiler.fusestatic = False
     return spec
@@ -193,44 +203,14 @@ def _compile_without_files(path: Path, error: Exception) -> tuple[Any, Any]:
     if needed:
         hint = f"; it is needed for the inertia of body '{needed[0]}', which states none (<inertial>)"
         raise _refusal(path, error, hint) from error
-    for asset in [*spec.skins, *spec.meshes, *spec.hfields, *spec.materials, *spec.textures]:
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
+    for asset in [*spec.skins, *spec.meshes, *spec.hfields, *spec.textures]:
         spec.delete(asset)
     try:
         return spec, spec.compile()
     except (ValueError, RuntimeError, MemoryError):
         raise _refusal(path, error) from error
-
-
-def _refuse_loops(compiled: Any, locked: Collection[str], path: Path) -> None:
-    """Nothing, if the mechanism is a tree whose joints move by themselves.
-
-    Raises:
-        RobotError: An active equality constraint couples bodies, joints or tendons.
-    """
-    kinds = {
-        int(mujoco.mjtEq.mjEQ_CONNECT): "connect",
-        int(mujoco.mjtEq.mjEQ_WELD): "weld",
-        int(mujoco.mjtEq.mjEQ_JOINT): "joint",
-        int(mujoco.mjtEq.mjEQ_TENDON): "tendon",
-    }
-    for k in range(compiled.neq):
-        kind = kinds.get(int(compiled.eq_type[k]))
-        if kind is None or not compiled.eq_active0[k]:
-            continue
-        ends, remedy = "", "remove it if the mechanism is a tree without it"
-        if kind == "joint":
-            names = [joint_names(compiled)[j] for j in (compiled.eq_obj1id[k], compiled.eq_obj2id[k]) if j >= 0]
-            if names[0] in locked:
-                continue
-            ends = " of " + " and ".join(f"joint '{name}'" for name in names)
-            remedy = f"lock it (locked={{'{names[0]}': 0.0}}), or {remedy}"
-        elif kind in ("connect", "weld"):
-            on_bodies = compiled.eq_objtype[k] == mujoco.mjtObj.mjOBJ_BODY
-            names = body_names(compiled) if on_bodies else [compiled.site(s).name for s in range(compiled.nsite)]
-            what = "bodies" if on_bodies else "sites"
-            ends = f" of {what} '{names[compiled.eq_obj1id[k]]}' and '{names[compiled.eq_obj2id[k]]}'"
-        name = f" '{compiled.equality(k).name}'" if compiled.equality(k).name else ""
-        raise RobotError(f"{path}: equality constraint <{kind}>{name}{ends}: closed loops are not supported; {remedy}")
 
 
 def _carried_bodies(compiled: Any, free_root: int | None, locked: Collection[str]) -> dict[str, str]:

@@ -5,6 +5,7 @@ Pinocchio's own MJCF parser knows no includes, frames, or unnamed bodies, and dr
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,7 @@ def body_names(compiled: Any) -> list[str]:
     return [compiled.body(b).name or f"body{b}" for b in range(compiled.nbody)]
 
 
-def build_pin_model(compiled: Any, *, free_root: int | None = None) -> Any:
+def build_pin_model(compiled: Any, *, free_root: int | None = None, left_out: Collection[int] = ()) -> Any:
     """The ``pin.Model`` of a compiled MJCF: joints in MuJoCo's order, bodies as BODY frames, limits, damping, armature.
 
     A body with several joints becomes a chain whose last joint carries it. Configurations are MuJoCo's, with ``ref``,
@@ -44,11 +45,14 @@ def build_pin_model(compiled: Any, *, free_root: int | None = None) -> Any:
     Args:
         compiled: ``mujoco.MjModel``.
         free_root: Body under which a free joint is put, if any.
+        left_out: Bodies that are no part of it, whole trees.
     """
     model = pin.Model()
     joints, bodies = joint_names(compiled), body_names(compiled)
     carriers = {0: (0, pin.SE3.Identity())}  # body -> its Pinocchio joint, and the body frame in that joint's frame
     for b in range(1, compiled.nbody):
+        if b in left_out:
+            continue
         carrier, pose = carriers[compiled.body_parentid[b]]
         pose = pose * _pose(compiled.body_pos[b], compiled.body_quat[b])
         if b == free_root:
@@ -134,13 +138,13 @@ def _set(model: Any, name: str, where: slice | int, value: Any) -> None:
     setattr(model, name, values)
 
 
-def find_free_root(compiled: Any, source: Path) -> int | None:
+def find_free_root(compiled: Any, source: Path, left_out: Collection[int] = ()) -> int | None:
     """The body to put a free joint under for a floating base; None if it floats already.
 
     Raises:
         RobotError: Several bodies stand in the world, so the base is not known.
     """
-    top = [b for b in range(1, compiled.nbody) if compiled.body_parentid[b] == 0]
+    top = [b for b in range(1, compiled.nbody) if compiled.body_parentid[b] == 0 and b not in left_out]
     moving = {int(compiled.body_rootid[b]) for b in range(1, compiled.nbody) if compiled.body_jntnum[b]}
     roots = [b for b in top if b in moving] or top
     if len(roots) != 1:

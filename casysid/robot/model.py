@@ -80,6 +80,8 @@ class Robot:
         faults: What was wrong with inertial parameters in the file.
         floating_base: Whether a free joint was put under the base of a file that has none.
         locked: Joints held at a position, by name [rad or m].
+        file_order: Names of the joints as the file has them; empty where that is Pinocchio's order, which takes the
+            children of a link by their names.
     """
 
     name: str
@@ -102,6 +104,17 @@ class Robot:
     faults: tuple[InertiaFault, ...] = ()
     floating_base: bool = False
     locked: tuple[tuple[str, float], ...] = ()
+    file_order: tuple[str, ...] = ()
+
+    @property
+    def numbered(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Channels and degrees of freedom in the order that a log's numbers count: that of the file."""
+        by_name = {joint.name: joint for joint in self.joints}
+        joints = [by_name[name] for name in self.file_order] or list(self.joints)
+        return (
+            tuple(name for joint in joints for name in self.channels[joint.channels]),
+            tuple(name for joint in joints for name in self.dofs[joint.v]),
+        )
 
     def __repr__(self) -> str:
         return f"<Robot '{self.name}': {self.nv} degrees of freedom, {len(self.links)} links, from {self.source.name}>"
@@ -179,6 +192,16 @@ class Robot:
 
         links = [f"{joint}_link" for joint in list(model.names)[1:]]
         return assemble_robot(model.copy(), links, name=name, source=Path(name), source_format=source_format)
+
+    def with_gravity(self, gravity: npt.ArrayLike) -> Robot:
+        """The same robot where its base stands otherwise: gravity in the base's frame, shape (3,), [m/s²].
+
+        Raises:
+            RobotError: It is not three finite numbers.
+        """
+        from casysid.robot.assembly import replace_gravity
+
+        return replace_gravity(self, gravity)
 
     def with_parameters(
         self,

@@ -131,16 +131,20 @@ def bodies_of(robot: Robot, parameters: Array | None = None) -> Bodies:
 
 
 def _distances(robot: Robot) -> tuple[Array, Array]:
-    """From each link's joint back to the one before, and on to the farthest next one, shape (links,) each, [m]."""
+    """From each link's joint back to the one before, and on to the farthest next one, shape (links,) each, [m].
+
+    Joints on the base are measured from their midst: where a robot stands says nothing of its size.
+    """
     place = {k: i for i, k in enumerate(k for k, joint in enumerate(robot.joints) if joint.link is not None)}
+    roots = [joint.placement.translation for joint in robot.joints if joint.parent < 0]
     before, onward = np.zeros(len(place)), np.zeros(len(place))
     for k, i in place.items():
         parent = k
-        while True:
-            before[i] += float(np.linalg.norm(robot.joints[parent].placement.translation))
-            parent = robot.joints[parent].parent
-            if parent < 0 or parent in place:
-                break
+        while parent >= 0 and (parent == k or parent not in place):
+            joint = robot.joints[parent]
+            shift = joint.placement.translation - (np.mean(roots, axis=0) if joint.parent < 0 else 0.0)
+            before[i] += float(np.linalg.norm(shift))
+            parent = joint.parent
         if parent >= 0:
             onward[place[parent]] = max(onward[place[parent]], before[i])
     return before, onward

@@ -17,7 +17,7 @@ from casysid.errors import ParameterError, RobotError
 from casysid.robot.assembly import ROOT_JOINT, assemble_robot, inertia_from_parameters
 from casysid.robot.checks import FaultKind, InertiaFault, check_gravity, check_inertia, warn_of_faults
 from casysid.robot.limits import check_chain, check_parts
-from casysid.robot.locking import lock_joints, lockable_values
+from casysid.robot.locking import lock_joints, lock_words, lockable_values
 from casysid.robot.lumping import joint_parts, sum_of
 from casysid.robot.model import Robot
 from casysid.robot.urdf_joints import UrdfJoint, read_joints, warn_of_doubts
@@ -66,6 +66,7 @@ def read_urdf(
         faults=faults,
         floating_base=adds_joint,
         locked=held,
+        file_order=tuple(joints),
     )
     moving = {joint.name for joint in robot.joints}
     warn_of_doubts(path, [joint for joint in joints.values() if joint.name in moving], stacklevel=stacklevel)
@@ -137,12 +138,16 @@ def _find_base(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], p
 
 def _refuse_mimics(joints: Iterable[UrdfJoint], held: Iterable[tuple[str, float]], path: Path) -> None:
     locked = {name for name, _ in held}
-    for joint in joints:
-        if joint.mimics is not None and joint.kind != "fixed" and joint.name not in locked:
-            raise RobotError(
-                f"{path}:{joint.element.line}: joint '{joint.name}' mimics '{joint.mimics}'; coupled joints are not "
-                f"supported: lock it (locked={{'{joint.name}': 0.0}}), or remove <mimic> if it moves by itself"
-            )
+    coupled = [
+        joint for joint in joints if joint.mimics is not None and joint.kind != "fixed" and joint.name not in locked
+    ]
+    if coupled:
+        listing = ", ".join(f"joint '{joint.name}' (line {joint.element.line}) '{joint.mimics}'" for joint in coupled)
+        rest = {joint.name: float(np.clip(0.0, joint.lower, joint.upper)) for joint in coupled}
+        raise RobotError(
+            f"{path}: joints that mimic others are not supported: {listing}; lock them ({lock_words(rest)}), or remove "
+            "<mimic> from those that move by themselves"
+        )
 
 
 def _floats_already(base: str, joints: Mapping[str, UrdfJoint]) -> bool:
@@ -195,7 +200,7 @@ def _joint_text(joint: UrdfJoint) -> str:
         f"<joint name={quoteattr(joint.name)} type={quoteattr(joint.kind)}><parent link={quoteattr(joint.parent)}/>"
         f"<child link={quoteattr(joint.child)}/><origin xyz={_numbers(joint.xyz)} rpy={_numbers(joint.rpy)}/>"
         f"<axis xyz={_numbers(joint.axis)}/>{limit}"
-        f"<dynamics damping={_numbers([joint.damping])} friction={_numbers([joint.friction])}/></joint>"
+        f"<dynamics damping={_numbers([joint.damping])} friction={_numbers([max(joint.friction, 0.0)])}/></joint>"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -16,6 +17,11 @@ MOST_ELEMENTS = 100_000
 """Of one file: a mobile manipulator's URDF has five hundred (TIAGo)."""
 DEEPEST = 500
 """Elements within each other: MuJoCo's own reader (TinyXML-2) allows no more."""
+_DECLARATION = re.compile(rb"""\A(?:\xef\xbb\xbf)?<\?xml\s[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
+_READ_AS_IT_IS = ("utf-8", "ascii", "iso8859-1", "utf-16")
+_CODECS = {"ansi": "cp1252", "gb2312": "gb18030", "gbk": "gb18030", "shift_jis": "cp932", "sjis": "cp932"}
+"""What vendors' programs write of the names that XML declares: a superset, and the code page of Windows."""
+_MARKUP = bytes(range(0x20, 0x5C)) + bytes(range(0x5D, 0x7E)) + b"\t\r\n"
 _START_TAG = re.compile(rb"""<[^\s/>]+(?:\s+[^\s=>]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s*/?>""")
 
 
@@ -66,11 +72,36 @@ class Element:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The file's bytes.
+    """The file's text in UTF-8, if its XML declares an encoding of one country; else its bytes as they are.
 
     Raises:
-        RobotError: It is not there, or is no readable file.
+        RobotError: It is not there, is no readable file, or is not in the encoding that it declares.
     """
+    return _in_utf8(_read(path), path)
+
+
+def _in_utf8(text: bytes, path: Path) -> bytes:
+    declared = _DECLARATION.match(text)
+    if declared is None:
+        return text
+    word = declared[1].decode("ascii")
+    name = _CODECS.get(word.lower().replace("-", "_"), word)
+    try:
+        codec = codecs.lookup(name)
+        kept = codec.name in _READ_AS_IT_IS or _MARKUP.decode(name) != _MARKUP.decode("ascii")
+        plain = "" if kept else text.decode(name)
+    except UnicodeDecodeError as error:
+        raise RobotError(
+            f"{path}: is not in the encoding that it declares, {word} (byte {error.start}); save it as UTF-8"
+        ) from error
+    except (LookupError, ValueError):
+        return text  # the parser has to say what it makes of that
+    if kept:
+        return text
+    return (plain[: declared.start(1)] + "UTF-8" + plain[declared.end(1) :]).encode("utf-8")
+
+
+def _read(path: Path) -> bytes:
     try:
         if not path.exists():
             raise RobotError(f"{path}: no such file (looked in {path.parent.resolve()})")

@@ -1,10 +1,11 @@
-"""What is fuzzed: six formats of input, two of results, and the command line."""
+"""What is fuzzed: formats of input, two of results, and the command line."""
 
 import contextlib
 import gzip
 import io
 import json
 import shlex
+import tempfile
 import warnings
 import zipfile
 import zlib
@@ -15,7 +16,8 @@ from unittest import mock
 
 import numpy as np
 import pyarrow as pa
-from pyarrow import parquet
+from pyarrow import feather, parquet
+from scipy.io import savemat
 
 from casysid.bundled import find_model
 from casysid.errors import ParameterError
@@ -74,6 +76,56 @@ def parquet_of(log: dict[str, np.ndarray], **options: object) -> bytes:
     stream = io.BytesIO()
     parquet.write_table(pa.table(log), stream, **options)
     return stream.getvalue()
+
+
+def dressed() -> tuple[bytes, ...]:
+    """The same with units, dates, lists of messages, decimal commas and blanks."""
+    log = columns()
+    time, motion = log["time"], np.column_stack([log[name] for name in list(log)[1:]])
+    rows = [[f"{x:.6g}" for x in row] for row in motion]
+    joints = "['" + "', '".join(robot().dofs) + "']"
+    lists = [
+        f'{t:.9f},"{joints}","[{r[0]}, {r[3]}]","({r[1]} {r[4]})","array([{r[2]}, {r[5]}])"'
+        for t, r in zip(time, rows, strict=True)
+    ]
+    dates = [
+        f"2024-05-06T07:08:{t:09.6f}Z;" + ";".join(row).replace(".", ",") for t, row in zip(time, rows, strict=True)
+    ]
+    blanks = [f"{17 * 10**17 + round(t * 1e9):>22d}  " + "   ".join(row) for t, row in zip(time, rows, strict=True)]
+    names = [
+        f"{joint}/{word}" for joint in robot().dofs for word in ("position [deg]", "velocity [rpm]", "effort [mNm]")
+    ]
+    return (
+        "\n".join(["stamp,name,position,velocity,effort", *lists]).encode(),
+        "\n".join([";".join(["time", *names]), *dates]).encode("utf-16"),
+        "\n".join(["%time " + " ".join(name.split()[0] for name in names), *blanks]).encode(),
+    )
+
+
+def feather_of(log: dict[str, np.ndarray]) -> bytes:
+    stream = io.BytesIO()
+    feather.write_feather(pa.table(log), stream, compression="uncompressed")
+    return stream.getvalue()
+
+
+def mat_of(log: dict[str, np.ndarray]) -> bytes:
+    stream = io.BytesIO()
+    savemat(stream, log)
+    return stream.getvalue()
+
+
+@cache
+def mcap() -> bytes:
+    """A bag of joint states."""
+    from tests.recording.dialects import Log, write_bag
+
+    log = columns()
+    two = {letter: np.column_stack([log[f"{letter}_{name}"] for name in robot().dofs]) for letter in ("q", "v", "tau")}
+    with tempfile.TemporaryDirectory() as folder:
+        write_bag(
+            Path(folder) / "bag", Log(np.round(log["time"] * 1e9).astype(np.int64), **two), 2, "MCAP", robot().dofs
+        )
+        return next((Path(folder) / "bag").glob("*.mcap")).read_bytes()
 
 
 def read_log(path: Path) -> None:
@@ -249,6 +301,10 @@ def targets() -> dict[str, Target]:
             _logs(".csv.gz", lambda log: gzip.compress(text_of(log), 1, mtime=0), gzipped(tokens), gzipped(blind)),
             _logs(".parquet", lambda log: parquet_of(log, compression="none"), tokens),
             Target("npz", ".npz", (plain, npz_of(numbered(), packed=True), matrices), (blind, archive), read_log),
+            Target("dressed", ".csv", dressed(), (blind, tokens, tokens), read_log),
+            _logs(".feather", feather_of, blind),
+            _logs(".mat", mat_of, blind),
+            Target("mcap", ".mcap", (mcap(),), (blind,), read_log),
             Target("urdf", ".urdf", model_seeds(".urdf"), (blind, tokens, tokens), read_model),
             Target("mjcf", ".xml", model_seeds(".xml"), (blind, tokens, tokens), read_model),
             Target("result", ".json", (result_text(),), (blind, keys, keys, tokens), read_result),

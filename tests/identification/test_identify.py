@@ -157,7 +157,8 @@ def test_a_joint_at_rest_is_named():
     position[:, 1] = 0.3
     still = dataclasses.replace(recording, position=position, velocity=None)
     verdict = judge(identify(bundled_robot("two_link.urdf"), still, QUICK))
-    assert any("Never moved: " + bundled_robot("two_link.urdf").dofs[1] in remark for remark in verdict.remarks)
+    assert any("Never moved: " + bundled_robot("two_link.urdf").dofs[1] in reason for reason in verdict.reasons)
+    assert not verdict.accepted
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from casysid.dynamics import build_regressor
 from casysid.errors import CasysidWarning
 from casysid.identification import MistakeKind, Settings, choose_band, find_mistakes, identify
+from casysid.identification.mistakes import Column, Mistake
+from casysid.identification.mistakes.gravity import angle_between, gravity_torque
 from casysid.identification.passes import Passes
 from casysid.recording import Recording, read_recording
 from casysid.robot import Robot
@@ -99,9 +101,9 @@ MISTAKES = [
     (MistakeKind.POSITION_NEGATED, {"q": negate(1)}, {1}),
     (MistakeKind.AXIS_NEGATED, {"q": negate(1), "tau": negate(1)}, {1}),
     (MistakeKind.ALL_TORQUES_NEGATED, {"tau": negate(slice(None))}, None),
-    (MistakeKind.TORQUES_SWAPPED, {"tau": swap(0, 1)}, {0, 1}),
-    (MistakeKind.POSITIONS_SWAPPED, {"q": swap(0, 1)}, {0, 1}),
-    (MistakeKind.JOINTS_SWAPPED, {"q": swap(0, 1), "tau": swap(0, 1)}, {0, 1}),
+    (MistakeKind.TORQUES_PERMUTED, {"tau": swap(0, 1)}, {0, 1}),
+    (MistakeKind.POSITIONS_PERMUTED, {"q": swap(0, 1)}, {0, 1}),
+    (MistakeKind.JOINTS_PERMUTED, {"q": swap(0, 1), "tau": swap(0, 1)}, {0, 1}),
     (MistakeKind.ZERO_SHIFTED, {"q": shift(1, np.pi / 2)}, {1}),
     (MistakeKind.DEGREES, {"q": scale(slice(None), 180 / np.pi)}, None),
     (MistakeKind.SCALE, {"tau": scale(1, 1000.0)}, {1}),
@@ -127,6 +129,60 @@ def test_one_mistake_is_named_with_its_joints_though_the_file_is_wrong(name, kin
 @given(st.sampled_from(["two_link.urdf", "scara.urdf", "head.urdf"]), st.integers(0, 2**32 - 1), st.integers(0, 2))
 def test_a_file_whose_masses_are_wrong_accuses_nobody(name, seed, log):
     assert search(with_wrong_masses(bundled_robot(name), seed), clean_log(name, log)) == ()
+
+
+@pytest.mark.parametrize("turned", [(9.81, 0.0, 0.0), (3.0, -5.0, -7.88)])
+def test_a_base_that_stands_otherwise_is_named_with_its_gravity(turned):
+    log, file = clean_log("head.urdf"), with_wrong_masses(bundled_robot("head.urdf"), 2)
+    standing = dataclasses.replace(file, model=turned_model(file, turned), gravity=np.array(turned))
+    (mistake,) = search(standing, log)
+    assert mistake.kind is MistakeKind.GRAVITY_TURNED
+    assert angle_between(np.array(mistake.gravity), np.array([0.0, 0.0, -9.81])) < 3.0
+    assert mistake.amount == pytest.approx(angle_between(np.array(turned), np.array(mistake.gravity)))
+    assert mistake.sentence.endswith(f"or try {mistake.option}")
+    assert mistake.option.startswith("--gravity ")
+
+
+def test_torque_without_gravity_is_named():
+    robot, log = bundled_robot("head.urdf"), clean_log("head.urdf")
+    held = gravity_torque(robot, log.position, robot.gravity)
+    (mistake,) = search(with_wrong_masses(robot, 3), dataclasses.replace(log, torque=log.torque - held))
+    assert mistake.words.startswith("these torques hold no gravity")
+    assert mistake.option == "--gravity 0 0 0"
+
+
+def turned_model(robot, gravity):
+    model = robot.model.copy()
+    model.gravity.linear = np.array(gravity)
+    return model
+
+
+def test_gravity_is_linear_and_what_the_regressor_has():
+    robot, rng = bundled_robot("head.urdf"), np.random.default_rng(0)
+    q, still = rng.uniform(-1.0, 1.0, (5, robot.nq)), np.zeros((5, robot.nv))
+    regressor = build_regressor(robot, ())
+    held = regressor.predict(regressor.prior, q, still, still)
+    np.testing.assert_allclose(gravity_torque(robot, q, robot.gravity), held, atol=1e-12)
+    np.testing.assert_allclose(gravity_torque(robot, q, -2.0 * robot.gravity), -2.0 * held, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_any_order_of_the_columns_is_named_with_its_signs(seed):
+    robot, log = bundled_robot("head.urdf"), clean_log("head.urdf")
+    rng = np.random.default_rng(seed)
+    order, sign = rng.permutation(robot.nv), rng.choice([-1.0, 1.0], robot.nv, p=[0.3, 0.7])
+    position, torque = np.empty_like(log.position), np.empty_like(log.torque)
+    position[:, order], torque[:, order] = log.position * sign, log.torque * sign
+    permuted = dataclasses.replace(log, position=position, torque=torque)
+    (mistake,) = search(with_wrong_masses(robot, seed), permuted)
+    turned = [bool(one < 0.0) for one in sign]
+    moved = [k for k in range(robot.nv) if order[k] != k or turned[k]]
+    truth = Mistake(
+        kind=MistakeKind.JOINTS_PERMUTED,
+        joints=tuple(robot.dofs[k] for k in moved),
+        order=tuple(Column(robot.dofs[order[k]], turned[k], turned[k]) for k in moved),
+    )
+    assert truth.words in (mistake.words, *mistake.alternatives)  # the head's two eyes are alike
 
 
 def test_two_mistakes_are_found_one_after_the_other():

@@ -44,6 +44,7 @@ class Dialect:
         digits: To which the numbers are read back (absolute); 0 for all bits.
         declared: What its user has to say.
         warns: What is said of it; empty for nothing.
+        lost: Rows at the start that are left out.
     """
 
     suffix: str
@@ -51,6 +52,7 @@ class Dialect:
     digits: float = 0.0
     declared: Declared = field(default_factory=Declared)
     warns: str = ""
+    lost: int = 0
 
 
 Cells = list[list[str]]
@@ -233,16 +235,16 @@ def write_structure(path: Path, log: Log) -> None:
     savemat(path, {"data": {"time": log.time, "pos": log.q, "vel": log.v, "torque": log.tau, "name": "run 7"}})
 
 
-def messages(log: Log) -> Iterator[tuple[int, list[str], np.ndarray, np.ndarray, np.ndarray]]:
+def messages(log: Log, joints: tuple[str, ...]) -> Iterator[tuple[int, list[str], np.ndarray, np.ndarray, np.ndarray]]:
     """Of a joint state's topic that a gripper shares; the joints in another order in every second message."""
     for n, t in enumerate(log.nanoseconds):
-        order = SHUFFLED if n % 2 else (0, 1, 2, 3)
-        yield int(t), [JOINTS[k] for k in order], log.q[n, order], log.v[n, order], log.tau[n, order]
+        order = SHUFFLED if n % 2 and len(joints) == 4 else tuple(range(len(joints)))
+        yield int(t), [joints[k] for k in order], log.q[n, order], log.v[n, order], log.tau[n, order]
         if n % 7 == 3:
             yield int(t) + 1000, ["finger"], np.array([0.01]), np.zeros(0), np.zeros(0)
 
 
-def write_bag(path: Path, log: Log, version: int, storage: str = "") -> None:
+def write_bag(path: Path, log: Log, version: int, storage: str = "", joints: tuple[str, ...] = JOINTS) -> None:
     from rosbags.rosbag1 import Writer as Writer1
     from rosbags.rosbag2 import StoragePlugin
     from rosbags.rosbag2 import Writer as Writer2
@@ -256,7 +258,7 @@ def write_bag(path: Path, log: Log, version: int, storage: str = "") -> None:
     plugin = {} if version == 1 else {"version": 9, "storage_plugin": StoragePlugin[storage]}
     with Writer1(path) if version == 1 else Writer2(path, **plugin) as bag:  # type: ignore[attr-defined]
         link = bag.add_connection("/joint_states", kind, typestore=store)
-        for n, (t, names, q, v, tau) in enumerate(messages(log)):
+        for n, (t, names, q, v, tau) in enumerate(messages(log, joints)):
             stamp = Time(sec=EPOCH + t // 10**9, nanosec=t % 10**9)
             head = Header(stamp=stamp, frame_id="", **({"seq": n} if version == 1 else {}))
             message = JointState(header=head, name=names, position=q, velocity=v, effort=tau)
@@ -311,7 +313,7 @@ DIALECTS: dict[str, Dialect] = {
     "semicolons": dressed(lambda log: usual(log, ";")),
     "decimal commas": dressed(lambda log: with_commas(log, ";")),
     "decimal commas and tabs": dressed(lambda log: with_commas(log, "\t"), suffix=".txt"),
-    "decimal commas late": dressed(lambda log: with_commas(log, ";", zeros=1), digits=np.inf),
+    "a first row of zeros": dressed(lambda log: with_commas(log, ";", zeros=1), lost=1, warns="1 single samples"),
     "trailing commas": dressed(lambda log: usual(log).replace("\n", ",\n").replace(",\n", "\n", 1)),
     "trailing commas in the header too": dressed(lambda log: usual(log).replace("\n", ",\n")),
     "carriage returns and a mark": dressed(lambda log: usual(log, end="\r\n"), encoding="utf-8-sig"),

@@ -182,6 +182,16 @@ def test_glitches_of_one_sample_are_left_out(tmp_path: Path) -> None:
     assert "3 single samples" in said[0]
 
 
+def test_a_first_row_of_zeros_is_left_out(tmp_path: Path) -> None:
+    log = clean()
+    for name in log.keys() - {"time"}:
+        log[name][0] = 0.0
+    recording, said = read(log, tmp_path)
+    assert_rows(recording, clean(), np.arange(1, 400))
+    assert len(said) == 1
+    assert "1 single samples" in said[0]
+
+
 def test_counts_of_a_clock_are_read_as_what_they_must_be(tmp_path: Path) -> None:
     for scale, unit in ((1e3, "ms"), (1e6, "us"), (1e9, "ns")):
         log = clean()

@@ -137,14 +137,14 @@ LOOPS = {
     "connect": ('<connect name="rod" body1="a" body2="b" anchor="0 0 0"/>', "<connect> 'rod' of bodies 'a' and 'b'"),
     "weld": ('<weld body1="b"/>', "<weld> of bodies 'b' and 'world'"),
     "sites": ('<weld site1="s" site2="t"/>', "<weld> of sites 's' and 't'"),
-    "joint": ('<joint joint1="j2" joint2="j1"/>', r"<joint> of joint 'j2' and joint 'j1'.*locked=\{'j2': 0.0\}"),
+    "joint": ('<joint joint1="j2" joint2="j1"/>', "<joint> of joint 'j2' and joint 'j1'.*--lock j2=0"),
 }
 
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_a_closed_loop_is_refused_by_name(name, read):
     text, message = LOOPS[name]
-    bodies = PAIR + '<site name="s"/><site name="t"/>'
+    bodies = PAIR.replace('<joint name="j2"', '<site name="t"/><joint name="j2"') + '<site name="s"/>'
     with pytest.raises(RobotError, match=f"equality constraint {message}"):
         read(model(bodies, after=f"<equality>{text}</equality>"))
     inactive = text.replace("/>", ' active="false"/>')
@@ -154,6 +154,59 @@ def test_a_closed_loop_is_refused_by_name(name, read):
 def test_a_coupled_joint_can_be_locked(read):
     text = model(PAIR, after=f"<equality>{LOOPS['joint'][0]}</equality>")
     assert read(text, locked={"j2": 0.0}).dofs == ("j1",)
+
+
+FOUR_BAR = HINGE + "".join(
+    f'<body name="{name}"><joint name="{name}" axis="1 0 0" range="10 90"/>{FULL}</body>' for name in ("p", "q")
+)
+CONNECT = '<equality><connect name="bar" body1="p" body2="q" anchor="0 0 0"/></equality>'
+
+
+def test_a_loop_asks_for_the_locks_that_open_it_and_loads_with_them(read):
+    text = model(FOUR_BAR + "</body>", after=CONNECT)
+    with pytest.raises(RobotError, match=r"--lock p=0.174533 --lock q=0.174533"):
+        read(text)
+    with pytest.raises(RobotError, match=r"lock what moves in them \(--lock q=0.174533\)"):
+        read(text, locked={"p": 0.2})
+    assert read(text, locked={"p": 0.2, "q": 0.2}).dofs == ("j1",)
+
+
+def test_all_loops_stand_in_one_message(read):
+    loops = CONNECT.replace("</equality>", '<joint joint1="j1"/></equality>')
+    with pytest.raises(RobotError, match=r"<connect> 'bar'.*<joint> of joint 'j1'.*--lock p=.*--lock q=.*--lock j1=0"):
+        read(model(FOUR_BAR + "</body>", after=loops))
+
+
+LOOSE = f'<body name="cube" pos="1 0 0"><freejoint name="cube_free"/>{FULL}</body>'
+
+
+def test_a_free_body_beside_the_robot_is_left_out_and_named(read):
+    with pytest.warns(CasysidWarning, match="left out: bodies of the scene that float beside the robot: 'cube'"):
+        robot = read(model(PAIR + LOOSE))
+    assert (robot.links, robot.dofs) == (("a", "b"), ("j1", "j2"))
+    alone = read(model(PAIR))
+    np.testing.assert_array_equal(robot.inertial_parameters, alone.inertial_parameters)
+    with pytest.warns(CasysidWarning, match="left out"):
+        assert read(model(PAIR + LOOSE), locked={"cube_free": 0.0}).dofs == ("j1", "j2")
+    with pytest.warns(CasysidWarning, match="left out"):
+        assert read(model(PAIR + LOOSE), floating_base=True).nv == 8
+
+
+def test_a_free_body_alone_is_a_robot(read):
+    assert read(model(LOOSE)).nv == 6
+
+
+def test_a_weld_to_a_mocap_body_is_left_out(read):
+    mocap = '<body name="hand" mocap="true"/>'
+    with pytest.warns(CasysidWarning, match="<weld> that draws body 'b' to a mocap body"):
+        assert read(model(PAIR + mocap, after='<equality><weld body1="hand" body2="b"/></equality>')).nv == 2
+
+
+def test_a_joint_and_its_body_may_share_a_name(read):
+    text = model(PAIR.replace('name="j2"', 'name="b"').replace('name="j1"', 'name="a"'))
+    robot, locked = read(text), read(text, locked={"b": 0.4})
+    assert (locked.links, locked.dofs) == (("a",), ("a",))
+    assert {frame.name for frame in locked.model.frames} == {frame.name for frame in robot.model.frames}
 
 
 EXTRAS = {

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from casysid.errors import CasysidWarning, RobotError
-from casysid.robot import FaultKind, JointKind, Robot
+from casysid.robot import FaultKind, JointKind, Robot, write_robot
 from tests.robot.urdf_models import ARM, trees
 
 REAL = sorted((Path(__file__).parents[3] / "shared" / "data").glob("*/*.urdf"))
@@ -159,7 +159,7 @@ BROKEN = {
     ),
     "mimic": (
         ARM.replace('<axis xyz="0 3 4"/>', '<axis xyz="0 3 4"/><mimic joint="shoulder"/>'),
-        r"joint 'elbow' mimics 'shoulder'.*locked=\{'elbow': 0.0\}",
+        "mimic others.*joint 'elbow' .line 36. 'shoulder'; lock them .--lock elbow=0.",
     ),
     "origin": (
         ARM.replace('xyz="0.4 0 0"', 'xyz="0,4 0 0"'),
@@ -272,3 +272,58 @@ def test_a_joint_without_limits_is_unlimited_with_a_warning(read):
 def test_negative_friction_is_doubted(read):
     with pytest.warns(CasysidWarning, match="joint 'shoulder': negative friction"):
         read(ARM.replace('damping="0.3"', 'damping="-0.3"'))
+
+
+def test_all_joints_that_mimic_others_stand_in_one_message_with_what_locks_them(read):
+    mimic = '<mimic joint="shoulder"/>'
+    text = ARM.replace('<axis xyz="0 3 4"/>', f'<axis xyz="0 3 4"/>{mimic}')
+    with pytest.raises(RobotError) as caught:
+        read(text)
+    assert "--lock elbow=0" in str(caught.value)
+    assert "elbow" not in read(text, locked={"elbow": 0.0}).dofs
+
+
+def test_negative_coulomb_friction_is_a_doubtful_prior_and_no_more(read):
+    text = ARM.replace('<axis xyz="0 3 4"/>', '<axis xyz="0 3 4"/><dynamics damping="0.1" friction="-0.2"/>')
+    with pytest.warns(
+        CasysidWarning, match="joint 'elbow': negative friction .damping 0.1, friction -0.2. is no usable"
+    ):
+        robot = read(text)
+    assert (robot.dry_friction >= 0.0).all()
+
+
+ENCODINGS = {"gb2312": "gb2312", "GBK": "gbk", "shift_jis": "shift_jis", "ANSI": "cp1252", "windows-1251": "cp1251"}
+
+
+@pytest.mark.parametrize("declared", ENCODINGS)
+def test_encodings_of_vendors_are_read_and_written_as_utf8(declared, tmp_path):
+    letters = {"gb2312": "机器人", "GBK": "機器人", "shift_jis": "ロボット", "ANSI": "Größe", "windows-1251": "робот"}
+    text = ARM.replace("a comment before the robot", letters[declared]).replace(
+        '<?xml version="1.0"?>', f'<?xml version="1.0" encoding="{declared}"?>'
+    )
+    path = tmp_path / "arm.urdf"
+    path.write_bytes(text.encode(ENCODINGS[declared]))
+    robot = Robot.from_file(path)
+    assert robot.dofs
+    out = tmp_path / "out.urdf"
+    write_robot(robot, out, robot.inertial_parameters)
+    written = out.read_text(encoding="utf-8")
+    assert letters[declared] in written
+    assert 'encoding="UTF-8"' in written
+    np.testing.assert_allclose(Robot.from_file(out).inertial_parameters, robot.inertial_parameters)
+
+
+def test_a_text_that_is_not_what_it_declares_is_refused(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_bytes(b'<?xml version="1.0" encoding="shift_jis"?><robot name="\x81\x20\xff"/>')
+    with pytest.raises(RobotError, match=r"not in the encoding that it declares, shift_jis .*save it as UTF-8"):
+        Robot.from_file(path)
+
+
+def test_a_link_and_a_fixed_joint_may_share_a_name(read):
+    twin = """<link name="pedestal"/><link name="stand"/>
+      <joint name="pedestal" type="fixed"><parent link="stand"/><child link="pedestal"/></joint>
+      <joint name="elbow_stand" type="fixed"><parent link="pedestal"/><child link="base"/></joint></robot>"""
+    robot = read(ARM.replace("</robot>", twin), locked={"elbow": 0.1})
+    assert "elbow" not in robot.dofs
+    assert "pedestal" in [frame.name for frame in robot.model.frames]
