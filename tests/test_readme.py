@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from casysid.bundled import find_model
+from casysid.recording import read_map
 from casysid.simulation import PlantSettings
 from tests.simulated import simulated_run
 
@@ -28,7 +29,8 @@ def words(code):
 
 
 SHELL = [line for language, code in BLOCKS if language == "sh" for line in words(code) if line not in NOT_RUN]
-EXPERIMENTS = [code for language, code in BLOCKS if language == "toml"]
+TOML = [code for language, code in BLOCKS if language == "toml"]
+EXPERIMENTS = [code for code in TOML if "[robot]" in code]
 PYTHON = [code for language, code in BLOCKS if language == "python"]
 
 
@@ -59,6 +61,12 @@ def test_every_block_says_what_it_is():
     every = [line for language, code in BLOCKS if language == "sh" for line in words(code)]
     assert NOT_RUN.keys() <= set(every)
     assert every[len(NOT_RUN)] == "source .venv/bin/activate"
+
+
+@pytest.mark.parametrize("code", [code for code in TOML if code not in EXPERIMENTS])
+def test_maps_of_columns_are_read(code, tmp_path):
+    (tmp_path / "map.toml").write_text(code, encoding="utf-8")
+    assert read_map(tmp_path / "map.toml").columns
 
 
 @pytest.mark.slow
