@@ -74,4 +74,4 @@ def _varying_energy(moments: Moments, regressor: Regressor) -> Array:
             column = squares.sum(axis=0)[place]
             if column[place] > 0.0:
                 energy[joint] -= column[-1] ** 2 / column[place]
-    return np.maximum(energy, 0.0)
+    return np.asarray(np.maximum(energy, 0.0))
