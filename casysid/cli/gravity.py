@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from typer.core import TyperCommand
 
 if TYPE_CHECKING:
-    import click
-
     from casysid.recording import Source
     from casysid.robot import Robot
 
@@ -22,8 +20,8 @@ Gravity = tuple[float, float, float] | None
 class CommandWithGravity(TyperCommand):
     """A verb whose ``--gravity`` takes ``auto`` beside three numbers."""
 
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """See :meth:`click.Command.parse_args`."""
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As the class before has it."""
         words: list[str] = []
         for word in args:
             words += AUTO if word == "auto" and words[-1:] == ["--gravity"] else [word]
