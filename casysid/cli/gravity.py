@@ -21,7 +21,7 @@ class CommandWithGravity(TyperCommand):
     """A verb whose ``--gravity`` takes ``auto`` beside three numbers."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """See :meth:`click.Command.parse_args`."""
+        """As the class before has it."""
         words: list[str] = []
         for word in args:
             words += AUTO if word == "auto" and words[-1:] == ["--gravity"] else [word]

@@ -79,13 +79,18 @@ def torque_criteria(unexplained: Unexplained) -> Iterator[Criterion]:
     """Of the whole and of every joint."""
     result, whole = unexplained.result, unexplained.whole
     at_all = whole > WHOLE_AT_ALL
+    reason = (
+        f"The model misses {whole:.0%} of the torque, which feedback has to supply. Excite more, and look for what the "
+        "model lacks; usable where that is enough."
+        if np.isfinite(whole)
+        else "Nothing explains these torques in any joint."
+    )
     yield Criterion(
         name="torque missed",
         value=whole,
         limit=WHOLE_AT_ALL if at_all else WHOLE,
         word=Word.REJECTED if at_all else Word.DOUBTFUL,
-        reason=f"The model misses {whole:.0%} of the torque, which feedback has to supply. Excite more, and look for "
-        "what the model lacks; usable where that is enough.",
+        reason=reason,
         origin=FELT,
     )
     yield from _each_joint(unexplained)
