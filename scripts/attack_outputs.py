@@ -83,7 +83,7 @@ def make_sides(folder: Path) -> Sides:
     settings = Settings(method=WeightedLeastSquares(), cutoff=12.0, delay=0.0, choose_friction=False)
     old, new = (identify(robot, record(robot, seed), settings) for seed in (1, 2))
     drawn = {id(result): render_report(result) for result in (old, new)}
-    html.render_report = lambda result: drawn[id(result)]
+    html.render_report = lambda result, origin=None: drawn[id(result)]
     digests = []
     for k, result in enumerate((old, new)):
         write(result, folder / str(k))

@@ -106,6 +106,12 @@ class OrderSearch:
         self._own = np.sum(self._tau**2, axis=0) - np.sum(along**2, axis=2)  # (motion column, torque column)
         self._along = along
 
+    def turned(self) -> Assignment:
+        """The order as logged, torques with the signs that the file explains better."""
+        order, ones = np.arange(len(self._joints)), np.ones(len(self._joints))
+        costs, signs = self._costs(order[None], ones[None])
+        return Assignment(order, order, ones, np.diag(signs[0]).copy(), float(np.trace(costs[0])))
+
     def best(self) -> tuple[list[Assignment], list[Assignment], list[Assignment]]:
         """The best assignments of torques alone, of positions alone, and of both together."""
         m = len(self._joints)

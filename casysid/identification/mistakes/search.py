@@ -186,22 +186,26 @@ class _Search:
     def _permuted(self) -> Iterator[_Reading]:
         """Readings of other orders of the columns that are clearly better; of alike ones the bodies' choice first."""
         search = OrderSearch(self._joints, self._samples, lambda few: self._witness.predict(few, self._gravity))
+        signs, _ = gain_of(self._now, self._explain(reordered(self._samples, self._joints, search.turned())))
         kinds = (MistakeKind.TORQUES_PERMUTED, MistakeKind.POSITIONS_PERMUTED, MistakeKind.JOINTS_PERMUTED)
         for kind, assignments in zip(kinds, search.best(), strict=True):
-            readings = [one for assignment in assignments if (one := self._ordered(kind, assignment)) is not None]
+            readings = [one for assignment in assignments if (one := self._ordered(kind, assignment, max(signs, 0.0)))]
             if len(readings) > 1:
                 readings.sort(key=lambda one: GravityFit(self._robot, one.samples).file.cost)
             for reading in readings:
                 yield dataclasses.replace(reading, gain=min(reading.gain, readings[0].gain))
 
-    def _ordered(self, kind: MistakeKind, assignment: Assignment) -> _Reading | None:
-        """The samples in another order, if that is clearly better and explains the joints concerned."""
+    def _ordered(self, kind: MistakeKind, assignment: Assignment, signs: float) -> _Reading | None:
+        """The samples in another order, if that is clearly better and explains the joints concerned.
+
+        ``signs`` is what torques of other signs gain in the order as logged: no order has to be changed for that.
+        """
         names, order = _changes(self._joints, assignment)
         if assignment.is_as_logged:
             return None
         samples = reordered(self._samples, self._joints, assignment)
         mistake = Mistake(kind=kind, joints=names, order=order)
-        reading = self._read_so(mistake, samples, MOVED_COLUMNS * (len(names) - 2))
+        reading = self._read_so(mistake, samples, signs + MOVED_COLUMNS * (len(names) - 2))
         dofs = [self._places[name][1] for name in names]
         convincing = reading is not None and share_explained(reading.explanation, samples, dofs) > CONVINCING
         return reading if convincing else None
