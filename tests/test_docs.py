@@ -9,6 +9,8 @@ ROOT = Path(__file__).parents[1]
 PLACES = ROOT, ROOT / "casysid"
 DOCS = [*sorted((ROOT / "docs").glob("*.md")), ROOT / "CONTRIBUTING.md", ROOT / "README.md"]
 FILE = re.compile(r"`((?:\w[\w.]*/)+(?:\w+\.(?:py|sh|md))?)`")
+WRITTEN = "run", "identified", "out", "meta", "answers"
+"""Folders of users."""
 LINK = re.compile(r"\]\(x\)")
 
 
