@@ -31,7 +31,8 @@ SUSPICIOUS = 4.0
 """Inertial torque that is so many times larger or smaller than gravity's share promises is looked into: model files
 are off by a factor of two, and a wrong clock of less is not to be told from a wrong file."""
 SIGNIFICANT = 3.0
-"""Standard errors that gravity's factor must have for a joint to be asked."""
+"""Standard errors that gravity's factor must have for a joint to be asked; inertia's as well, unless its absence is as
+clear."""
 MINIMUM_JOINTS = 2
 """So many joints at least must say the same."""
 CLOCK_TOLERANCE = 0.2
@@ -173,7 +174,8 @@ def inertial_shares(split: SplitMoments) -> Array:
         factors = _solve(total)
         left_out = np.array([_solve(total - block) for block in apart])
         error = np.sqrt((len(apart) - 1) / len(apart) * np.sum((left_out - left_out.mean(axis=0)) ** 2, axis=0))
-        if factors[0] > SIGNIFICANT * error[0]:
+        told = max(factors[0], factors[1]) > SIGNIFICANT * error[1]
+        if told and factors[0] > SIGNIFICANT * error[0]:
             shares.append(factors[1] / factors[0])
     return np.array(shares)
 
