@@ -204,7 +204,9 @@ class Source(ABC):
     def excerpts(self, count: int = EXCERPTS, rows: int = BATCH // EXCERPTS) -> tuple[Recording, ...]:
         """Short recordings in memory from ``count`` places evenly over this one; all of it if it is no longer."""
         if len(self) <= count * rows:
-            return tuple(self.batches(max(len(self), 1)))
+            from casysid.recording.recording import joined
+
+            return (joined(tuple(self.batches(max(len(self), 1)))),)
         starts = np.linspace(0, len(self) - rows, count).astype(int).tolist()
         parts = (next(self.between(start, start + rows).batches(rows)) for start in starts)
         return tuple(dataclasses.replace(part) for part in parts)  # copies, where a part may be a view of a batch

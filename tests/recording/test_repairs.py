@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from casysid.bundled import find_model
 from casysid.errors import CasysidWarning, RecordingError
 from casysid.readers.repairs import ROW, Columns, Glitches, Repairs, together
 from casysid.recording import Recording, open_recording, read_recording
@@ -255,3 +256,16 @@ def test_shared_time_increases_and_keeps_to_its_stamps(counts: list[int], cuts: 
     np.testing.assert_array_equal(np.floor(found), time)
     steps = np.diff(found)
     np.testing.assert_allclose(steps, np.repeat(1.0 / np.array(counts), counts)[:-1])
+
+
+def test_a_short_log_that_comes_in_parts_is_one_excerpt(tmp_path, monkeypatch):
+    time = np.arange(200) * 0.02
+    rows = np.stack([time, 0.8 + 0.1 * np.sin(time), 0.3 * np.cos(time), np.sin(3 * time), np.cos(2 * time)], 1)
+    path = tmp_path / "log.csv"
+    np.savetxt(path, rows, delimiter=",", header="time,q1,q2,tau1,tau2", comments="", fmt="%.9f")
+    recording = open_recording(path, Robot.from_file(find_model("two_link.urdf")))
+    (whole,) = recording.batches(200)
+    parts = whole.selected(slice(0, 199)), whole.selected(slice(199, None))
+    monkeypatch.setattr(type(recording), "batches", lambda *_: iter(parts))
+    (one,) = recording.excerpts()
+    np.testing.assert_array_equal(one.position, whole.position)

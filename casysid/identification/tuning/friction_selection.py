@@ -196,7 +196,8 @@ class _Search:
         self, proposal: Proposal, without: HeldOutScore, score: HeldOutScore, evidence: float
     ) -> ChosenFriction:
         rows = self._rows(proposal)
-        target = max(float((without.target[:, rows] @ self._weights[rows]).sum()), np.finfo(np.float64).tiny)
+        logged = self._candidates.moments.target_energy().sum(axis=0)[rows]
+        target = max(float(logged @ self._weights[rows]), np.finfo(np.float64).tiny)
         before, after = (
             float(np.sqrt((one.energy[:, rows] @ self._weights[rows]).sum() / target)) for one in (without, score)
         )
