@@ -226,16 +226,17 @@ def build_regressor(
         couplings: Motors that act on several joints.
         quasi_static: Torques hold gravity and friction, but nothing inertial: for links velocity and acceleration, for
             drives acceleration count as zero.
-        torque_gains: Measured torque over true torque of every degree of freedom, shape (nv,); None is ones.
+        torque_gains: Measured torque over true torque of every degree of freedom, shape (nv,), negative where it is
+            logged with the other sign; None is ones.
 
     Raises:
         ParameterError: When a kind of friction or a coupling is given twice, a coupling names an unknown joint, or a
-            column uses the position of a degree of freedom that has none; or gains are not nv positive numbers.
+            column uses the position of a degree of freedom that has none; or gains are not nv numbers other than zero.
     """
     gains = np.ones(robot.nv) if torque_gains is None else np.asarray(torque_gains, dtype=np.float64)
-    if gains.shape != (robot.nv,) or not (np.isfinite(gains).all() and (gains > 0.0).all()):
+    if gains.shape != (robot.nv,) or not (np.isfinite(gains).all() and gains.all()):
         raise ParameterError(
-            f"torque gains: one positive number for each of {', '.join(robot.dofs)}; got {torque_gains}"
+            f"torque gains: one number other than zero for each of {', '.join(robot.dofs)}; got {torque_gains}"
         )
     kinds, coupled = [column.kind for column in friction], [coupling.name for coupling in couplings]
     if len(set(kinds)) != len(kinds) or len(set(coupled)) != len(coupled):

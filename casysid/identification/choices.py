@@ -24,10 +24,11 @@ class Choices:
         band: Cut-offs of smoothing, equations and errors.
         width: Velocity within which Coulomb's smooth sign turns, by degree of freedom, shape (nv,).
         clock: Whether the time stamps are seconds, and whether torques hold inertia.
-        mistakes: What in the recordings contradicts the model file; nothing was changed for it.
+        mistakes: What in the recordings contradicts the model file; nothing was changed for it but ``signs``.
         delay: How late the torque is.
         friction: What joined the friction that was asked for.
         gains: Of the joints' torques relative to each other.
+        signs: -1 where a joint's torque was taken to be logged with the other sign, else 1, shape (nv,).
         smoothings: How often each recording was smoothed on the way.
         passes: How often the equations of each recording were evaluated on the way.
     """
@@ -39,6 +40,7 @@ class Choices:
     delay: DelayChoice
     friction: FrictionChoice
     gains: DriveGains
+    signs: Array
     smoothings: int
     passes: int
 
@@ -56,7 +58,7 @@ class Choices:
             "mistakes": [mistake.to_json() for mistake in self.mistakes],
             "delay": self.delay.to_json(joints),
             "torque_gains": {
-                "gains": dict(zip(joints, self.gains.values.tolist(), strict=True)),
+                "gains": dict(zip(joints, (self.gains.values * self.signs).tolist(), strict=True)),
                 "std": dict(zip(joints, self.gains.error.tolist(), strict=True)),
                 "reason": self.gains.reason,
             },

@@ -18,7 +18,7 @@ from casysid.identifiability import BaseParameters, excited_base_parameters, str
 from casysid.identification.aside import gains_of_the_rest
 from casysid.identification.choices import Choices
 from casysid.identification.friction_laws import friction_laws
-from casysid.identification.mistakes import find_mistakes
+from casysid.identification.mistakes import find_mistakes, torque_signs
 from casysid.identification.noise_moments import with_noise
 from casysid.identification.order import as_given, places_by_content
 from casysid.identification.passes import Mapped, Passes, excerpts, is_long
@@ -26,7 +26,13 @@ from casysid.identification.result import IdentificationResult
 from casysid.identification.sameness import check_sameness
 from casysid.identification.settings import Settings
 from casysid.identification.tuning.band import BandChoice, choose_band
-from casysid.identification.tuning.candidates import Candidates, final_regressor, gather_candidates, moments_of
+from casysid.identification.tuning.candidates import (
+    Candidates,
+    final_regressor,
+    gather_candidates,
+    moments_of,
+    with_torque_gains,
+)
 from casysid.identification.tuning.clock import choose_clock
 from casysid.identification.tuning.delay import choose_delay
 from casysid.identification.tuning.friction_selection import FrictionChoice, fit_model, select_friction
@@ -315,26 +321,30 @@ def _choose(
     mistakes = find_mistakes(robot, passes.sparse_motions, band.cutoff)
     for mistake in mistakes:
         warnings.warn(mistake.sentence, CasysidWarning, stacklevel=4)
+    signs = np.ones(robot.nv) if settings.torque_gains else torque_signs(mistakes, robot.dofs)
+    measured = _with_gains(settings, signs)
+    if (signs < 0.0).any():
+        candidates = with_torque_gains(candidates, passes, measured)
     progress("tuning", 0.5)
     delay = choose_delay(passes, candidates.base, settings.delay)
-    usual = fit_model(candidates, candidates.model(), settings) if candidates.proposals else None
-    uses = None if usual is None else ripple_uses(passes, candidates, usual)
+    usual = fit_model(candidates, candidates.model(), measured) if candidates.proposals else None
+    uses = None if usual is None else ripple_uses(passes, candidates, usual.estimate)
     if uses or not delay.is_none:
-        passes, candidates = _gather(robot, recordings, band, settings, delay.seconds, uses)
+        passes, candidates = _gather(robot, recordings, band, measured, delay.seconds, uses)
         work.append(passes)
     progress("tuning", 0.7)
-    friction = select_friction(candidates, settings, usual) if usual else FrictionChoice(settings)
-    regressor = final_regressor(candidates, settings, [proposal for proposal, _ in friction.taken])
+    friction = select_friction(candidates, measured, usual) if usual else FrictionChoice(measured)
+    regressor = final_regressor(candidates, measured, [proposal for proposal, _ in friction.taken])
     moments = moments_of(regressor, candidates, friction.taken)
     gains = gains_of_the_rest(moments, regressor, settings)
     if gains.found:
         warnings.warn(gains.reason, CasysidWarning, stacklevel=4)
-        settings = dataclasses.replace(settings, torque_gains=tuple(gains.values.tolist()))
-        regressor = final_regressor(candidates, settings, [proposal for proposal, _ in friction.taken])
+        measured = _with_gains(settings, gains.values * signs)
+        regressor = final_regressor(candidates, measured, [proposal for proposal, _ in friction.taken])
         moments = passes.moments(regressor)
     friction = dataclasses.replace(
         friction,
-        settings=dataclasses.replace(settings, friction=regressor.friction, couplings=regressor.couplings),
+        settings=dataclasses.replace(measured, friction=regressor.friction, couplings=regressor.couplings),
     )
     looked_at = passes
     if is_long(whole):
@@ -357,10 +367,16 @@ def _choose(
         delay=delay,
         friction=friction,
         gains=gains,
+        signs=signs,
         smoothings=sum(one.smoothings for one in work),
         passes=sum(one.passes for one in work),
     )
     return _Chosen(choices, regressor, moments, passes, looked_at)
+
+
+def _with_gains(settings: Settings, gains: Array) -> Settings:
+    """With the gains of the joints' torques, where any is not one."""
+    return settings if (gains == 1.0).all() else dataclasses.replace(settings, torque_gains=tuple(gains.tolist()))
 
 
 def _gather(

@@ -5,6 +5,7 @@ consistent parameters is convex: Clarabel finds its global optimum, which certif
 """
 
 from casysid.projection.api import constrained_least_squares, convex_least_squares, project
+from casysid.projection.cuts import HalfSpaces, nearest_in_half_spaces
 from casysid.projection.knowledge import (
     KeptLink,
     Knowledge,
@@ -23,6 +24,7 @@ from casysid.projection.sampling import project_samples
 __all__ = [
     "FLOOR",
     "PRIOR_BUDGET",
+    "HalfSpaces",
     "KeptLink",
     "Knowledge",
     "LinearKnowledge",
@@ -37,6 +39,7 @@ __all__ = [
     "constrained_least_squares",
     "convex_least_squares",
     "link_mass",
+    "nearest_in_half_spaces",
     "parameter_within",
     "project",
     "project_samples",

@@ -11,6 +11,7 @@ Source: Lawson and Hanson (1974), *Solving Least Squares Problems*, ch. 23 (leas
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -25,6 +26,13 @@ OUTSIDE = 1e-4
 """A point is inside when no eigenvalue is further below zero, in the frame's units: a tenth of the floor."""
 NEAR = 0.3
 """Eigenvalues at the answer below this are cut from the start."""
+
+
+class HalfSpaces(NamedTuple):
+    """``rows θ >= lower``, shapes (k, p) and (k,)."""
+
+    rows: Array
+    lower: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +60,10 @@ class Cuts:
         free = self.basis.T @ (target - self.origin)
         rows, slack = self.rows @ self.basis, self.slack
         for _ in range(ROUNDS):
-            inside = _nearest_in_half_spaces(free, rows, -slack)
-            if inside is None:
+            near = nearest_in_half_spaces(free, rows, -slack)
+            if near is None:
                 return None
+            inside, _ = near
             scaled = solve_triangular(self.factor, self.origin + self.basis @ inside)
             normals, values = _eigenvalue_cuts(self.cone, scaled, -OUTSIDE)
             if not len(values):
@@ -84,6 +93,16 @@ def cuts_at(cone: Cone, factor: Array, answer: Array) -> Cuts:
     return Cuts(cone, factor, basis, factor @ answer, rows, np.maximum(slack, 0.0))
 
 
+def half_spaces_at(cone: Cone, answer: Array) -> HalfSpaces:
+    """Half-spaces of ``φ`` that hold a feasible set, and bound it near a feasible ``φ``, shape (p,)."""
+    matrix = cone.matrix.toarray()[: cone.equalities + cone.inequalities]
+    offset = cone.offset[: len(matrix)]
+    normals, values = _eigenvalue_cuts(cone, answer, NEAR)
+    same = matrix[: cone.equalities]
+    rows = np.vstack([-matrix, same, normals])
+    return HalfSpaces(rows, np.concatenate([-offset, offset[: len(same)], normals @ answer - values]))
+
+
 def _whitened(normals: Array, factor: Array) -> Array:
     """Gradients with respect to ``z`` of what has gradients ``normals`` with respect to ``φ``, shape (k, p)."""
     return np.asarray(solve_triangular(factor, normals.T, trans="T").T)
@@ -97,11 +116,17 @@ def _eigenvalue_cuts(cone: Cone, scaled: Array, below: float) -> tuple[Array, Ar
     return cone.gradients(body, v), values[body, place]
 
 
-def _nearest_in_half_spaces(target: Array, rows: Array, lower: Array) -> Array | None:
-    """The nearest ``x`` to a target with ``rows x >= lower``, shape (f,); None when there is none to be found."""
+def nearest_in_half_spaces(target: Array, rows: Array, lower: Array) -> tuple[Array, Array] | None:
+    """The nearest ``x`` to a target with ``rows x >= lower``, and the rows that hold it; None when none is found.
+
+    Args:
+        target: Shape (f,).
+        rows: Shape (k, f).
+        lower: Shape (k,).
+    """
     lacking = lower - rows @ target
     if not (lacking > 0.0).any():
-        return target
+        return target, rows[:0]
     length = np.linalg.norm(rows, axis=1)
     sound = length > 0.0
     unit, lacking = rows[sound] / length[sound, None], lacking[sound] / length[sound]
@@ -112,4 +137,4 @@ def _nearest_in_half_spaces(target: Array, rows: Array, lower: Array) -> Array |
     except RuntimeError:
         return None
     residual = stacked @ weights - np.append(np.zeros(len(target)), 1.0)
-    return None if not residual[-1] < 0.0 else target - size * residual[:-1] / residual[-1]
+    return None if not residual[-1] < 0.0 else (target - size * residual[:-1] / residual[-1], unit[weights > 0.0])

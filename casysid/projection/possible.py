@@ -9,7 +9,7 @@ from scipy.linalg import LinAlgError, cholesky
 from casysid.arrays import Array
 from casysid.errors import SolverError
 from casysid.projection.certificate import USUAL_WEIGHT, certify, rough_answer
-from casysid.projection.cuts import cuts_at
+from casysid.projection.cuts import HalfSpaces, cuts_at, half_spaces_at
 from casysid.projection.misfit import misfit_of_estimate
 from casysid.projection.problem import ProjectionProblem
 from casysid.projection.task import Task, task_of
@@ -46,6 +46,14 @@ class PossibleParameters:
         """
         near = self._by_cuts(estimate, metric)
         return self._by_convex_solver(estimate, metric, residual_energy) if near is None else near
+
+    def half_spaces(self) -> HalfSpaces:
+        """Half-spaces that hold the consistent parameters, and bound them near the last answer; none before it."""
+        if self._task is None or self._scaled is None:
+            size = len(self._problem.layout)
+            return HalfSpaces(np.zeros((0, size)), np.zeros(0))
+        rows, lower = half_spaces_at(self._task.cone, self._scaled)
+        return HalfSpaces(np.asarray(np.linalg.solve(self._task.frame.transform.T, rows.T).T), lower)
 
     def _by_cuts(self, estimate: Array, metric: Array) -> Array | None:
         if self._task is None or self._scaled is None:

@@ -33,7 +33,8 @@ class EarlierResult:
         flip: Columns whose signs are turned.
         time_scale: Time stamps times this are seconds.
         quasi_static: Whether torques hold no inertial part.
-        torque_gains: Measured torque over true torque, by joint; one for those not named.
+        torque_gains: Measured torque over true torque, by joint, negative where its sign is another; one for those
+            not named.
     """
 
     drives: Drives = field(default_factory=dict)
@@ -64,9 +65,7 @@ def read_earlier_result(path: str | Path) -> EarlierResult:
             flip=texts(content.get("flip", []), "flip"),
             time_scale=number(clock.get("scale", 1.0), "time_base.scale", 1e-9, 3600.0),
             quasi_static=bool(clock.get("quasi_static", False)),
-            torque_gains=numbers_by_name(
-                object_at(content, "torque_gains", "gains"), "torque_gains.gains", SMALLEST_GAIN, 1.0 / SMALLEST_GAIN
-            ),
+            torque_gains=_gains(content),
         )
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         reason = f"there is no '{error.args[0]}'" if isinstance(error, KeyError) and error.args else str(error)
@@ -85,6 +84,16 @@ def _drives(content: Mapping[str, Any]) -> Drives:
             kind: None if value is None else number(value, f"friction.{owner}.{kind}") for kind, value in kinds.items()
         }
     return drives
+
+
+def _gains(content: Mapping[str, Any]) -> dict[str, float]:
+    """Negative ones are of torques that were logged with the other sign."""
+    gains = numbers_by_name(
+        object_at(content, "torque_gains", "gains"), "torque_gains.gains", -1.0 / SMALLEST_GAIN, 1.0 / SMALLEST_GAIN
+    )
+    for dof, gain in gains.items():
+        number(abs(gain), f"torque_gains.gains.{dof}", SMALLEST_GAIN)
+    return gains
 
 
 def _cutoff(content: Mapping[str, Any]) -> float | None:

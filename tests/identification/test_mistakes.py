@@ -205,11 +205,23 @@ def test_samples_without_time_are_searched_as_well():
     assert mistake.words == f"tau of {robot.dofs[1]} looks negated"
 
 
-def test_identify_warns_and_changes_nothing():
+def test_identify_warns_and_takes_a_turned_torque_so():
     robot, log = bundled_robot("two_link.urdf"), changed(clean_log("two_link.urdf"), tau=negate(1))
-    with pytest.warns(CasysidWarning, match=f"tau of {robot.dofs[1]} looks negated.*Nothing was changed"):
+    with pytest.warns(CasysidWarning, match=f"tau of {robot.dofs[1]} looks negated.*It was taken so"):
         result = identify(robot, log, Settings(cutoff=6.0, delay=0.0))
     assert result.to_json()["mistakes"][0]["kind"] == "torque_negated"
+    np.testing.assert_array_equal(result.train_motions[0].tau, log.torque)
+    np.testing.assert_array_equal(result.choices.signs, [1.0, -1.0])
+    straight = identify(robot, clean_log("two_link.urdf"), Settings(cutoff=6.0, delay=0.0))
+    np.testing.assert_allclose(result.parameters, straight.parameters, rtol=1e-6, atol=1e-9)
+    assert result.train.relative == pytest.approx(straight.train.relative, rel=1e-6)
+
+
+def test_identify_warns_and_changes_nothing_else():
+    robot, log = bundled_robot("two_link.urdf"), changed(clean_log("two_link.urdf"), q=negate(1))
+    with pytest.warns(CasysidWarning, match="Nothing was changed"):
+        result = identify(robot, log, Settings(cutoff=6.0, delay=0.0))
+    np.testing.assert_array_equal(result.choices.signs, [1.0, 1.0])
     np.testing.assert_array_equal(result.train_motions[0].tau, log.torque)
 
 

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
+
+from casysid.arrays import Array
 
 
 class MistakeKind(enum.Enum):
@@ -78,12 +83,13 @@ class Mistake:
 
     @property
     def sentence(self) -> str:
-        """What looks wrong, why, and that nothing was done about it."""
+        """What looks wrong, why, and what was done about it: a torque's sign is taken so, nothing else is changed."""
         others = f" (or else: {'; '.join(self.alternatives)})" if self.alternatives else ""
         before, after = self.explained
+        done = "It was taken so" if self.negated_torques else "Nothing was changed"
         return (
             f"{self.words}{others}. The model file explains {before:.1%} of that torque's variance as logged, "
-            f"{after:.1%} so corrected. Nothing was changed; {self._remedy}"
+            f"{after:.1%} so corrected. {done}; {self._remedy}"
         )
 
     @property
@@ -118,6 +124,12 @@ class Mistake:
             case _:
                 return None
 
+    @property
+    def negated_torques(self) -> tuple[str, ...]:
+        """Joints whose torque has the other sign, where no other reading does nearly as well."""
+        is_sign = self.kind in (MistakeKind.TORQUE_NEGATED, MistakeKind.ALL_TORQUES_NEGATED)
+        return self.joints if is_sign and not self.alternatives else ()
+
     def to_json(self) -> dict[str, object]:
         """Plain words and numbers."""
         return {
@@ -132,6 +144,12 @@ class Mistake:
             "order": {joint: one.words for joint, one in zip(self.joints, self.order, strict=False)},
             "gravity": list(self.gravity),
         }
+
+
+def torque_signs(mistakes: Sequence[Mistake], dofs: Sequence[str]) -> Array:
+    """-1 where a degree of freedom's torque is clearly logged with the other sign, else 1, shape (nv,)."""
+    negated = [joint for mistake in mistakes for joint in mistake.negated_torques]
+    return np.array([(-1.0) ** negated.count(dof) for dof in dofs])
 
 
 def _number(value: float) -> str:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from casysid.dynamics import (
     PHYSICAL_KINDS,
@@ -30,16 +31,22 @@ from casysid.dynamics.friction import joint_directions
 from casysid.identification.friction_candidates import Proposal, joined, joint_uses, propose
 from casysid.identification.passes import Passes
 from casysid.identification.settings import Settings
+from casysid.identification.tuning.drive_gains import scaled
 from casysid.moments import Indices, Moments
 from casysid.robot import Robot
 
-DISPLACEMENTS = (0.0003, 0.003, 0.03, 0.3)
-"""Of the elements of friction before sliding, in standard deviations of the position: decades below the travel, down to
-where an element turns as sharply as a step, at the reversal of the position and not of a smoothed velocity."""
+DISPLACEMENTS = (0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
+"""Of the elements of friction before sliding, in standard deviations of the position, half a decade apart. They go down
+to where an element turns as sharply as a step, at the reversal of the position and not of a smoothed velocity. Whole
+decades left twice the error where friction has its way before sliding."""
 SHARPER = 10.0
-"""Width of the usual smooth sign over that of the sharp one: a decade, as between the displacements."""
+"""Width of the usual smooth sign over that of the sharp one: a decade."""
 CLEAR_OF_NOISE = 3.0
 """Standard deviations of the smoothed positions' noise that an element must be wide: a narrower one turns with it."""
+POSES = 100
+"""Of a recording in which it is asked which joints gravity loads."""
+ROUNDING = 1e-9
+"""Of the most loaded joint's torque: less is the arithmetic's."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +111,9 @@ def usual_friction(passes: Passes, settings: Settings) -> tuple[FrictionKind, ..
         if dof in single
     }
     displacements = {name: tuple(several) for name, several in clear.items() if several}
-    usual: list[FrictionKind] = [SharpCoulomb(tuple((passes.width / SHARPER).tolist())), LoadedCoulomb(width)]
+    usual: list[FrictionKind] = [SharpCoulomb(tuple((passes.width / SHARPER).tolist()))]
+    if loaded := _loaded(passes):
+        usual.append(LoadedCoulomb(width, tuple(directions[dof].name for dof in loaded)))
     if displacements:
         usual.append(MaxwellSlip(displacements))
     there = [one.kind for one in friction]
@@ -119,6 +128,29 @@ def gather_candidates(passes: Passes, settings: Settings, uses: Mapping[int, Joi
         settings: Its friction and couplings are the usual model's.
         uses: How the joints move; None takes it from the passes.
     """
+    columns = _columns(passes, settings, uses)
+    return Candidates(moments=passes.moments(columns.regressor), **columns._asdict())
+
+
+def with_torque_gains(candidates: Candidates, passes: Passes, settings: Settings) -> Candidates:
+    """The same for other gains of the joints' torques, without a pass; ``settings`` as they were but for these."""
+    columns, moments = _columns(passes, settings), candidates.moments
+    before, after = (one.template.sensing.gains for one in (candidates.regressor, columns.regressor))
+    dofs = [passes.robot.dofs.index(moments.joints[row]) for row in moments.moving_rows]
+    factors = np.array(after)[dofs] / np.array(before)[dofs]
+    return Candidates(moments=scaled(moments, factors), **columns._asdict())
+
+
+class _Columns(NamedTuple):
+    """All of :class:`Candidates` but the moments."""
+
+    base: Regressor
+    regressor: Regressor
+    proposals: tuple[tuple[Proposal, tuple[int, ...]], ...]
+    gravity: dict[int, int]
+
+
+def _columns(passes: Passes, settings: Settings, uses: Mapping[int, JointUse] | None = None) -> _Columns:
     robot, friction = passes.robot, usual_friction(passes, settings)
     base = build_regressor(
         robot,
@@ -135,10 +167,9 @@ def gather_candidates(passes: Passes, settings: Settings, uses: Mapping[int, Joi
     additions = [*gravity, *(column for proposal in proposals for column in proposal.columns)]
     regressor = extend_regressor(base, additions) if additions else base
     first = len(base.names) + len(gravity)
-    return Candidates(
+    return _Columns(
         base,
         regressor,
-        passes.moments(regressor),
         tuple(_with_columns(proposals, regressor, len(base.parts) + len(gravity), first)),
         {dof: len(base.names) + k for k, dof in enumerate(directions)},
     )
@@ -164,6 +195,16 @@ def _proposals(
     if not settings.quasi_static:
         return proposals
     return tuple(one for one in proposals if Armature.kind not in [kind.kind for kind, _ in one.columns])
+
+
+def _loaded(passes: Passes) -> list[int]:
+    """Degrees of freedom that the file's bodies load by their weight; that of all others is rounding."""
+    model, data = passes.robot.model, passes.robot.model.createData()
+    largest = np.zeros(passes.robot.nv)
+    for motion in passes.sparse_motions:
+        for q in motion.q[:: max(1, len(motion.q) // POSES)]:
+            largest = np.maximum(largest, np.abs(pin.computeGeneralizedGravity(model, data, q)))
+    return np.flatnonzero(largest > ROUNDING * largest.max(initial=0.0)).tolist()
 
 
 def _single(passes: Passes) -> set[int]:

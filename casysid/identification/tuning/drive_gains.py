@@ -41,6 +41,9 @@ SMALLEST = 0.1
 """Gains that are all nearer to one than this are none: torque constants are known no better."""
 USUAL, PRICE = 0.3, 0.01
 """A gain that is off by so much (in its logarithm) must lower the residual energy by this share."""
+TOLD = 1e-3
+"""Share of the torque that gains must explain: a thousandth is below what any sensor of torque or current shows, and in
+perfect data what smoothing leaves is explained by anything."""
 STEPS, LONGEST_STEP, SETTLED = 8, 0.3, 3e-3
 """Of Gauss-Newton: how many, how far in a logarithm, and the relative fall of the cost that ends it."""
 
@@ -117,8 +120,10 @@ def _search(
         return no_gains(dofs)
     gains, with_them = fit.gains(moments)
     voting = weights > 0.0
-    fitted = fit.error(scaled(moments, gains), with_them) / fit.error(moments, fit.consistent(moments))
-    if np.abs(gains[voting] - 1.0).max() < SMALLEST or fitted > 1.0 - PRACTICAL_GAIN:
+    before, after = fit.error(moments, fit.consistent(moments)), fit.error(scaled(moments, gains), with_them)
+    torque = math.sqrt(float(weights @ moments.target_energy().sum(axis=0)))
+    is_small = np.abs(gains[voting] - 1.0).max() < SMALLEST or math.sqrt(max(before**2 - after**2, 0.0)) < TOLD * torque
+    if is_small or after > (1.0 - PRACTICAL_GAIN) * before:
         return no_gains(dofs)
     folds = contiguous_folds(moments.blocks, FOLDS)
     values, without, with_gains = [], [], []

@@ -12,11 +12,14 @@ import dataclasses
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.arrays import Array
-from casysid.dynamics import Parameter, Regressor
+from casysid.dynamics import Parameter, Regressor, SharpCoulomb
+from casysid.dynamics.friction import joint_directions
 from casysid.errors import CasysidWarning
 from casysid.estimation import EmpiricalBayes, Estimate
 from casysid.estimation.cross_validation import contiguous_folds
@@ -27,23 +30,18 @@ from casysid.identification.friction_laws import physics_rows
 from casysid.identification.settings import Settings
 from casysid.identification.tuning.candidates import Candidates
 from casysid.identification.tuning.held_out import FOLDS, HeldOut
-from casysid.identification.tuning.log_score import HeldOutScore
+from casysid.identification.tuning.log_score import PRACTICAL_GAIN, HeldOutScore
 from casysid.inertia import Consistency
 from casysid.moments import Indices
-from casysid.projection import LinearKnowledge, PossibleParameters, build_projection
+from casysid.projection import HalfSpaces, LinearKnowledge, PossibleParameters, build_projection
 
 MOST = 30
 """Kinds that may join: more than any robot's drives have."""
-CLEARLY_BETTER = 1.0 / 3.0
-"""Fall of the energy of its joints' errors on time left out for which a kind joins: of a hundred candidates one gains
-something on any motion, and a spring or a ripple that is not there costs the next motion more than it gained here."""
-CLEARLY_BROKEN = 2.0
-"""Standard errors by which a law of other columns must be missed to keep a candidate out: the fit to come holds it."""
 ROUNDS, MORE_ROUNDS = 12, 4
 """Of the first fit on the way, past the cautious ones and two inflations of the scores, and of those that go on from
 the one before; the last fit takes what it needs."""
 AT_ZERO = 1e-7
-"""A coefficient below this share of the largest is zero to the convex solver."""
+"""A coefficient whose torque is below this share of the largest's is zero to the convex solver."""
 
 Columns = tuple[int, ...]
 
@@ -96,7 +94,14 @@ class FrictionChoice:
     taken: tuple[tuple[Proposal, Columns], ...] = field(default=(), repr=False)
 
 
-def select_friction(candidates: Candidates, settings: Settings, usual: Estimate | None = None) -> FrictionChoice:
+class ModelFit(NamedTuple):
+    """The fit of some columns, and half-spaces that bound what is possible near it."""
+
+    estimate: Estimate
+    possible: HalfSpaces
+
+
+def select_friction(candidates: Candidates, settings: Settings, usual: ModelFit | None = None) -> FrictionChoice:
     """The candidates that join the usual model.
 
     Args:
@@ -107,6 +112,7 @@ def select_friction(candidates: Candidates, settings: Settings, usual: Estimate 
     search = _Search(candidates, settings, usual)
     while len(search.taken) < MOST and search.add_some():
         pass
+    search.confirm_usual()
     model = joined(candidates.base.friction, settings.couplings, [proposal for proposal, _ in search.taken])
     return FrictionChoice(
         dataclasses.replace(settings, friction=model.columns, couplings=model.couplings, choose_friction=False),
@@ -119,7 +125,7 @@ def select_friction(candidates: Candidates, settings: Settings, usual: Estimate 
 class _Search:
     """The model so far, and what is asked of it."""
 
-    def __init__(self, candidates: Candidates, settings: Settings, usual: Estimate | None) -> None:
+    def __init__(self, candidates: Candidates, settings: Settings, usual: ModelFit | None) -> None:
         self._candidates, self._settings = candidates, settings
         self.taken: list[tuple[Proposal, Columns]] = []
         self.chosen: list[ChosenFriction] = []
@@ -127,8 +133,11 @@ class _Search:
         moments = candidates.moments
         self._centre = centre_of(moments, candidates.regressor.prior)
         self._shifted = moments.shifted(self._centre)
+        logged = np.maximum(moments.target_energy().sum(axis=0), np.finfo(np.float64).tiny)
+        self._energy = np.diag(moments.pooled(1.0 / logged).xx)
         self._folds = contiguous_folds(moments.blocks, FOLDS)
         self._fit = usual
+        self._beside: HeldOut | None = None
 
     def add_some(self) -> bool:
         """Let the best candidates that pass join, at most one a joint before the next fit; False when none does."""
@@ -136,9 +145,9 @@ class _Search:
         left = [one for one in self._candidates.proposals if one[0].name not in names]
         if not left or len(self._folds) < 2:
             return False
-        held_out = self._held_out()
+        held_out = self._beside = self._held_out()
         gains = np.array([held_out.gain(columns, self._noise) for _, columns in left])
-        new, joints = Columns(), set[int]()
+        new, joints = (), set[int]()
         without = held_out.score()
         for place in np.argsort(-gains, kind="stable").tolist():
             if gains[place] <= np.log(len(self._candidates.proposals)):
@@ -146,10 +155,14 @@ class _Search:
             proposal, columns = left[place]
             if joints & set(proposal.joints):
                 continue
-            score = held_out.score((*new, *columns))
-            if self._is_better(proposal, without, score) and self._is_lawful(held_out, new, columns):
+            rows = self._rows(proposal.joints)
+            if not self._is_better(rows, without, held_out.score((*new, *columns))):
+                continue
+            score = held_out.lawful_score((*new, *columns))
+            if self._is_better(rows, without, score):
                 self.taken.append((proposal, columns))
-                self.chosen.append(self._described(proposal, without, score, float(gains[place])))
+                words = proposal.kind, proposal.description
+                self.chosen.append(self._described(proposal.joints, words, without, score, float(gains[place])))
                 new, without = (*new, *columns), score
                 joints |= set(proposal.joints)
         return bool(new)
@@ -158,54 +171,71 @@ class _Search:
         """Errors beside the fit of the model so far, coefficients that a law holds at zero left out."""
         model = self._candidates.model([columns for _, columns in self.taken])
         parameters = [self._candidates.parameters[column] for column in model]
-        estimate = self._fit = fit_model(self._candidates, model, self._settings, self._fit)
-        free = model[~at_zero(parameters, estimate.parameters)]
+        fit = self._fit = fit_model(self._candidates, model, self._settings, self._fit and self._fit.estimate)
+        estimate = fit.estimate
+        free = model[~at_zero(parameters, estimate.parameters, self._energy[model]) & (self._energy[model] > 0.0)]
         kept = np.isin(model, free)
         weights = estimate.noise_std**-2.0
         pull = estimate.metric - self._candidates.moments.select_columns(model).pooled(weights).xx
         self._weights, self._noise = weights, estimate.diagnostics[INFLATION]
-        return HeldOut(self._shifted, free, weights, pull[np.ix_(kept, kept)], self._folds)
+        laws = self._laws_beside(model, fit.possible)
+        return HeldOut(self._shifted, free, weights, pull[np.ix_(kept, kept)], self._folds, laws)
 
-    def _rows(self, proposal: Proposal) -> list[int]:
-        """Rows on which a proposal acts."""
-        own = {self._candidates.base.robot.dofs[joint] for joint in proposal.joints}
+    def _laws_beside(self, model: Indices, possible: HalfSpaces) -> HalfSpaces:
+        """What bounds the model's columns, with the laws that candidates' columns enter, relative to the centre."""
+        rows = np.zeros((len(possible.rows), len(self._centre)))
+        rows[:, model] = possible.rows
+        others = np.delete(self._laws, model, axis=1).any(axis=1)
+        rows = np.vstack([rows, self._laws[others]])
+        lower = np.append(possible.lower, np.zeros(int(others.sum())))
+        return HalfSpaces(rows, lower - rows @ self._centre)
+
+    def confirm_usual(self) -> None:
+        """Name the usual kinds beside those asked for without which a joint's time left out is clearly worse told."""
+        if self._beside is None:
+            return
+        asked, base = {one.kind for one in self._settings.friction}, self._candidates.base
+        directions = {direction.name: dof for dof, direction in joint_directions(base.robot).items()}
+        whole = self._beside.score()
+        for part in base.parts:
+            if part.kind.kind in asked or isinstance(part.kind, SharpCoulomb):
+                continue
+            joints, without = (directions[part.direction.name],), self._beside.lawful_score(without=part.columns)
+            if self._is_better(self._rows(joints), without, whole):
+                words = part.kind.kind, part.kind.describe(part.direction)
+                self.chosen.append(self._described(joints, words, without, whole))
+
+    def _rows(self, joints: Sequence[int]) -> list[int]:
+        """Rows of some degrees of freedom."""
+        own = {self._candidates.base.robot.dofs[joint] for joint in joints}
         moments = self._candidates.moments
         return [k for k, place in enumerate(moments.moving_rows.tolist()) if moments.joints[place] in own]
 
-    def _is_better(self, proposal: Proposal, without: HeldOutScore, score: HeldOutScore) -> bool:
-        rows = self._rows(proposal)
+    def _is_better(self, rows: list[int], without: HeldOutScore, score: HeldOutScore) -> bool:
         before, after = (one.energy[:, rows] @ self._weights[rows] for one in (without, score))
-        clear = after.sum() <= (1.0 - CLEARLY_BETTER) * before.sum()
+        clear = after.sum() <= (1.0 - PRACTICAL_GAIN) ** 2 * before.sum()
         no_worse = (score.energy @ self._weights).sum() < (without.energy @ self._weights).sum()
         return bool((after < before).all() and clear and no_worse)
 
-    def _is_lawful(self, held_out: HeldOut, joined: Columns, columns: Columns) -> bool:
-        """Whether the fit to all data keeps the candidate's laws, and hardly breaks any that the fit without it keeps.
-
-        Coefficients of friction that is not there are zero but for their noise, and change sign with any candidate.
-        """
-        both = (*joined, *columns)
-        before, after = (self._laws @ (self._centre + held_out.fit(own)) for own in (joined, both))
-        C = held_out.covariance(both, self._noise)
-        error = np.sqrt(np.maximum(np.einsum("rm,mn,rn->r", self._laws, C, self._laws, optimize=True), 0.0))
-        own = (self._laws[:, list(columns)] != 0.0).any(axis=1)
-        kept = (after >= 0.0) | (~own & ((before < 0.0) | (after >= -CLEARLY_BROKEN * error)))
-        return bool(kept.all())
-
     def _described(
-        self, proposal: Proposal, without: HeldOutScore, score: HeldOutScore, evidence: float
+        self,
+        joints: Sequence[int],
+        words: tuple[str, str],
+        without: HeldOutScore,
+        score: HeldOutScore,
+        evidence: float = 0.0,
     ) -> ChosenFriction:
-        rows = self._rows(proposal)
+        rows = self._rows(joints)
         logged = self._candidates.moments.target_energy().sum(axis=0)[rows]
         target = max(float(logged @ self._weights[rows]), np.finfo(np.float64).tiny)
         before, after = (
             float(np.sqrt((one.energy[:, rows] @ self._weights[rows]).sum() / target)) for one in (without, score)
         )
-        joints = tuple(self._candidates.base.robot.dofs[joint] for joint in proposal.joints)
-        return ChosenFriction(joints, proposal.kind, proposal.description, before, after, evidence)
+        names = tuple(self._candidates.base.robot.dofs[joint] for joint in joints)
+        return ChosenFriction(names, *words, before, after, evidence)
 
 
-def fit_model(candidates: Candidates, model: Indices, settings: Settings, like: Estimate | None = None) -> Estimate:
+def fit_model(candidates: Candidates, model: Indices, settings: Settings, like: Estimate | None = None) -> ModelFit:
     """The fit of some of the candidates' columns, possible parameters only, going on from that of fewer."""
     parameters = [candidates.parameters[column] for column in model]
     prior = np.array([parameter.prior for parameter in parameters])
@@ -218,15 +248,15 @@ def fit_model(candidates: Candidates, model: Indices, settings: Settings, like: 
     method = EmpiricalBayes(standard_errors=False, iterations=MORE_ROUNDS if like else ROUNDS, like=like)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CasysidWarning)  # of an inconsistent model file: the answer's projection warns
-        return method.estimate_among(moments, prior, PossibleParameters(problem, prior))
+        possible = PossibleParameters(problem, prior)
+        return ModelFit(method.estimate_among(moments, prior, possible), possible.half_spaces())
 
 
-def at_zero(parameters: Sequence[Parameter], values: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Which drive parameters a law would hold at zero, because the unconstrained fit has them there or below."""
-    largest = max((abs(v) for p, v in zip(parameters, values, strict=True) if p.non_negative), default=0.0)
-    return np.array(
-        [p.non_negative and p.kind != "m" and v <= AT_ZERO * largest for p, v in zip(parameters, values, strict=True)]
-    )
+def at_zero(parameters: Sequence[Parameter], values: Array, energy: Array) -> npt.NDArray[np.bool_]:
+    """Which drive parameters a law holds at zero: what their columns, of some energy, make of torque is rounding."""
+    bound = np.array([parameter.non_negative and parameter.kind != "m" for parameter in parameters])
+    effect = np.abs(values) * np.sqrt(energy)
+    return np.asarray(bound & (effect <= AT_ZERO * effect.max(where=bound, initial=0.0)))
 
 
 def _laws_of(regressor: Regressor, parameters: Sequence[Parameter]) -> tuple[LinearKnowledge, ...]:

@@ -64,16 +64,18 @@ def correction_criteria(result: IdentificationResult) -> Iterator[Criterion]:
 
 
 def _named(mistake: Mistake) -> Criterion:
-    """A mistake of the log or the base that was found and, as nothing is changed, is still in it."""
-    unit = mistake.kind is MistakeKind.SCALE
+    """A mistake of the log or the base that was found: a torque's sign is taken so, all else is still in the log."""
+    unit, corrected = mistake.kind is MistakeKind.SCALE, bool(mistake.negated_torques)
     words = mistake.words.rstrip("?")
     remedy = f": try {mistake.option}" if mistake.option else ""
+    if corrected:
+        remedy = f" and was taken so: check it, and say {mistake.option} if it is"
     return Criterion(
         name=mistake.kind.name.lower().replace("_", " "),
         joint=mistake.joints[0] if len(mistake.joints) == 1 else "",
         value=mistake.gain,
         limit=0.0,
-        word=Word.DOUBTFUL if unit else Word.REJECTED,
+        word=Word.DOUBTFUL if unit or corrected else Word.REJECTED,
         reason=f"{words[:1].upper()}{words[1:]}{'?' if unit else ''}{remedy}{'' if unit else '.'}",
         origin="the model file's own prediction, read so, explains the log far better",
     )

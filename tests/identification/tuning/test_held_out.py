@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
 from casysid.identification.tuning.held_out import LEAST_PULL, HeldOut
 from casysid.moments import Moments
+from casysid.projection import HalfSpaces
 
 ROWS, BLOCKS, KNOWN, TRIED = 2000, 20, 6, 12
 
@@ -109,8 +111,44 @@ def test_held_out_energies_are_those_of_fits_one_by_one(columns):
         variance = training.residual_energy(theta).sum(axis=0) / training.count.sum(axis=0)
         np.testing.assert_allclose(score.variance[k], variance, rtol=1e-9)
     np.testing.assert_allclose(held_out.fit(columns), refit(moments, 1.0), rtol=1e-8, atol=1e-10)
-    covariance = held_out.covariance(columns, 3.0)
-    precision = moments.pooled(weights).xx[np.ix_(model, model)] + ridge
-    np.testing.assert_allclose(covariance[np.ix_(model, model)], 3.0 * np.linalg.inv(precision), rtol=1e-6, atol=1e-12)
-    others = np.setdiff1d(np.arange(KNOWN + TRIED), model)
-    assert not covariance[others].any()
+    np.testing.assert_allclose(held_out.lawful_score(columns).energy, score.energy, rtol=1e-9)
+
+
+@given(st.integers(0, 10_000), st.integers(0, 2))
+@settings(max_examples=20)
+def test_lawful_fits_are_those_of_a_quadratic_program(seed, more):
+    """Against SciPy's bounded least squares, for laws that are signs."""
+    rng = np.random.default_rng(seed)
+    x, y = regression(seed)
+    moments, columns = Moments.from_rows(x, y, blocks=BLOCKS), tuple(KNOWN + k for k in range(more))
+    own, pull = [*range(KNOWN), *columns], 0.1
+    bounded = rng.random(len(own)) < 0.7
+    rows = np.eye(KNOWN + TRIED)[np.array(own)[bounded]]
+    folds = np.array_split(np.arange(BLOCKS), 5)
+    laws = HalfSpaces(rows, np.zeros(len(rows)))
+    held_out = HeldOut(moments, np.arange(KNOWN), np.ones(1), pull * np.eye(KNOWN), folds, laws)
+    score = held_out.lawful_score(columns)
+    for k, fold in enumerate(folds):
+        square = moments.select_blocks(np.setdiff1d(np.arange(BLOCKS), fold)).pooled(np.ones(1))
+        H = 1.25 * square.xx[np.ix_(own, own)]
+        ridge = np.diag([pull] * KNOWN + [0.0] * more)
+        root = np.linalg.cholesky(H + ridge).T
+        target = np.linalg.solve(root.T, 1.25 * square.xy[own])
+        lower = np.where(bounded, 0.0, -np.inf)
+        theta = np.zeros(KNOWN + TRIED)
+        theta[own] = lsq_linear(root, target, bounds=(lower, np.inf), tol=1e-14, max_iter=500).x
+        wanted = moments.select_blocks(fold).residual_energy(theta).sum(axis=0)
+        np.testing.assert_allclose(score.energy[k], wanted, rtol=1e-5)
+
+
+def test_what_laws_hold_a_candidate_cannot_move():
+    """A column that would join beside a coefficient that its sign holds at zero is judged with that one at zero."""
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(ROWS, 3))
+    y = -x[:, 0] + 0.5 * x[:, 1] + 0.1 * rng.normal(size=ROWS)
+    moments, laws = Moments.from_rows(x, y, blocks=BLOCKS), HalfSpaces(np.eye(3)[:1], np.zeros(1))
+    folds = np.array_split(np.arange(BLOCKS), 5)
+    held_out = HeldOut(moments, np.arange(2), np.ones(1), np.zeros((2, 2)), folds, laws)
+    assert held_out.fit()[0] == pytest.approx(0.0, abs=1e-9)
+    assert held_out.fit([2])[0] == pytest.approx(0.0, abs=1e-9)
+    assert held_out.fit()[1] == pytest.approx(0.5, abs=0.1)

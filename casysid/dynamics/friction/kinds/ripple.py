@@ -6,9 +6,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from casysid.dynamics.friction.direction import Direction, force_unit
 from casysid.dynamics.friction.harmonics import Harmonics
 from casysid.dynamics.friction.kind import DriveState, FrictionKind, JointUse, Term
+
+LONG = (0.5, 1.0, 1.5)
+"""Periods over the joint's range, half of one apart, which is what the range tells apart: a periodogram of the residual
+shows those of two and more, since the weight, an offset and friction take part of a longer one."""
+USUAL_RANGE = 2.0 * np.sqrt(2.0)
+"""Of a sinusoidal position, in its standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +37,12 @@ class Ripple(Harmonics):
 
     @classmethod
     def candidates(cls, use: JointUse) -> Iterator[FrictionKind]:
-        """The wave numbers that the residual shows."""
+        """The wave numbers that the residual shows, and waves that are longer than it can show."""
         if use.ripple:
             yield cls({use.direction.name: use.ripple})
+        if use.travel and not use.direction.unlimited:
+            for periods in LONG:
+                yield cls({use.direction.name: (2.0 * np.pi * periods / (USUAL_RANGE * use.travel),)})
 
     def describe(self, direction: Direction) -> str:
         """In words, with its wave numbers."""
