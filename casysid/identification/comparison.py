@@ -9,7 +9,8 @@ from types import MappingProxyType
 
 from casysid.errors import CasysidError
 from casysid.estimation import Estimator
-from casysid.identification.pipeline import Preparation, Progress, silent, solve
+from casysid.identification.choosing import Progress
+from casysid.identification.pipeline import Preparation, silent, solve
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 from casysid.threads import single_threaded

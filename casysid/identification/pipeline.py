@@ -2,41 +2,26 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from casysid.arrays import Array
-from casysid.dynamics import JointUse, Regressor
+from casysid.dynamics import Regressor
 from casysid.errors import CasysidWarning, RecordingError
 from casysid.estimation import Estimate
 from casysid.identifiability import BaseParameters, excited_base_parameters, structural_base_parameters
-from casysid.identification.aside import gains_of_the_rest
 from casysid.identification.choices import Choices
+from casysid.identification.choosing import Progress, choose
 from casysid.identification.friction_laws import friction_laws
-from casysid.identification.mistakes import find_mistakes, torque_signs
 from casysid.identification.noise_moments import with_noise
 from casysid.identification.order import as_given, places_by_content
 from casysid.identification.passes import Mapped, Passes, excerpts, is_long
 from casysid.identification.result import IdentificationResult
 from casysid.identification.sameness import check_sameness
 from casysid.identification.settings import Settings
-from casysid.identification.tuning.band import BandChoice, choose_band
-from casysid.identification.tuning.candidates import (
-    Candidates,
-    final_regressor,
-    gather_candidates,
-    moments_of,
-    with_torque_gains,
-)
-from casysid.identification.tuning.clock import choose_clock
-from casysid.identification.tuning.delay import choose_delay
-from casysid.identification.tuning.friction_selection import FrictionChoice, fit_model, select_friction
-from casysid.identification.tuning.ripples import ripple_uses
 from casysid.moments import Moments
 from casysid.projection import (
     KeptLink,
@@ -47,6 +32,7 @@ from casysid.projection import (
     project,
 )
 from casysid.recording import Source
+from casysid.recording.even_stamps import evened
 from casysid.robot import Robot
 from casysid.robot.likely_bodies import believed
 from casysid.signals import InputNoise, Motion
@@ -56,8 +42,6 @@ from casysid.uncertainty import ParameterUncertainty, propagate
 
 PRIOR_BUDGET = 0.03
 """Share of the residual energy that may be spent on staying near the model file where the data hardly see."""
-Progress = Callable[[str, float], None]
-"""Called with the stage and the share of it that is done."""
 
 
 def silent(stage: str, share: float) -> None:
@@ -156,6 +140,7 @@ def prepare(
         )
     check_noise(fitted, settings.input_noise)
     check_sameness(fitted, held_out)
+    fitted, held_out = evened(fitted), evened(held_out)
     clock = _Clock()
     fitted, held_out = (tuple(one.flipped(settings.flip) for one in several) for several in (fitted, held_out))
     places = places_by_content(fitted)
@@ -164,7 +149,7 @@ def prepare(
     witness = believed(robot, [known.link for known in settings.knowledge if isinstance(known, KeptLink)])
     if witness.sentence:
         warnings.warn(witness.sentence, CasysidWarning, stacklevel=3)
-    chosen = _choose(witness.robot, fitted, settings, progress, mapped)
+    chosen = choose(witness.robot, fitted, settings, progress, mapped)
     clock.lap("tuning")
     progress("moments", 0.0)
     regressor, moments, passes = chosen.regressor, chosen.moments, chosen.passes
@@ -287,108 +272,6 @@ def _project(
     found = project(problem, estimate.parameters, estimate.metric, prior, residual_energy=energy)
     uncertainty = propagate(estimate, moments, regressor.parameters, problem, found, prior, residual_energy=energy)
     return found, uncertainty
-
-
-@dataclass(frozen=True, eq=False)
-class _Chosen:
-    """Choices, the regressor and the moments that they led to, and passes over all and over what was looked at."""
-
-    choices: Choices
-    regressor: Regressor
-    moments: Moments
-    passes: Passes
-    looked_at: Passes
-
-
-def _choose(
-    robot: Robot, recordings: Sequence[Source], settings: Settings, progress: Progress, mapped: Mapped
-) -> _Chosen:
-    """Band, clock, delay, friction and gains, each given those before; recordings are smoothed anew for a new clock."""
-    whole, recordings = recordings, excerpts(recordings, mapped)
-    band = choose_band(whole, settings.cutoff)
-    passes, candidates = _gather(robot, recordings, band, settings)
-    progress("tuning", 0.3)
-    clock = choose_clock(passes, candidates, settings.time_scale, settings.quasi_static)
-    if clock.reason:
-        warnings.warn(clock.reason, CasysidWarning, stacklevel=4)
-    settings = dataclasses.replace(settings, quasi_static=clock.quasi_static)
-    work = [passes]
-    if clock.scale != 1.0 or clock.quasi_static:
-        whole, recordings = (tuple(one.with_time_scaled(clock.scale) for one in some) for some in (whole, recordings))
-        band = choose_band(whole, settings.cutoff)
-        passes, candidates = _gather(robot, recordings, band, settings)
-        work.append(passes)
-    mistakes = find_mistakes(robot, passes.sparse_motions, band.cutoff)
-    for mistake in mistakes:
-        warnings.warn(mistake.sentence, CasysidWarning, stacklevel=4)
-    signs = np.ones(robot.nv) if settings.torque_gains else torque_signs(mistakes, robot.dofs)
-    measured = _with_gains(settings, signs)
-    if (signs < 0.0).any():
-        candidates = with_torque_gains(candidates, passes, measured)
-    progress("tuning", 0.5)
-    delay = choose_delay(passes, candidates.base, settings.delay)
-    usual = fit_model(candidates, candidates.model(), measured) if candidates.proposals else None
-    uses = None if usual is None else ripple_uses(passes, candidates, usual.estimate)
-    if uses or not delay.is_none:
-        passes, candidates = _gather(robot, recordings, band, measured, delay.seconds, uses)
-        work.append(passes)
-    progress("tuning", 0.7)
-    friction = select_friction(candidates, measured, usual) if usual else FrictionChoice(measured)
-    regressor = final_regressor(candidates, measured, [proposal for proposal, _ in friction.taken])
-    moments = moments_of(regressor, candidates, friction.taken)
-    gains = gains_of_the_rest(moments, regressor, settings)
-    if gains.found:
-        warnings.warn(gains.reason, CasysidWarning, stacklevel=4)
-        measured = _with_gains(settings, gains.values * signs)
-        regressor = final_regressor(candidates, measured, [proposal for proposal, _ in friction.taken])
-        moments = passes.moments(regressor)
-    friction = dataclasses.replace(
-        friction,
-        settings=dataclasses.replace(measured, friction=regressor.friction, couplings=regressor.couplings),
-    )
-    looked_at = passes
-    if is_long(whole):
-        passes = Passes(
-            robot,
-            whole,
-            band,
-            delays=delay.seconds,
-            blocks=settings.blocks,
-            threads=settings.threads,
-            mapped=mapped,
-        ).like(passes)
-        moments = passes.moments(regressor)
-        work.append(passes)
-    choices = Choices(
-        band=band,
-        width=passes.width if settings.coulomb_width is None else np.full(robot.nv, settings.coulomb_width),
-        clock=clock,
-        mistakes=mistakes,
-        delay=delay,
-        friction=friction,
-        gains=gains,
-        signs=signs,
-        smoothings=sum(one.smoothings for one in work),
-        passes=sum(one.passes for one in work),
-    )
-    return _Chosen(choices, regressor, moments, passes, looked_at)
-
-
-def _with_gains(settings: Settings, gains: Array) -> Settings:
-    """With the gains of the joints' torques, where any is not one."""
-    return settings if (gains == 1.0).all() else dataclasses.replace(settings, torque_gains=tuple(gains.tolist()))
-
-
-def _gather(
-    robot: Robot,
-    recordings: Sequence[Source],
-    band: BandChoice,
-    settings: Settings,
-    delays: Array | None = None,
-    uses: Mapping[int, JointUse] | None = None,
-) -> tuple[Passes, Candidates]:
-    passes = Passes(robot, recordings, band, delays=delays, blocks=settings.blocks, threads=settings.threads)
-    return passes, gather_candidates(passes, settings, uses)
 
 
 class _Clock:

@@ -13,6 +13,7 @@ from casysid.errors import ParameterError
 from casysid.identification import BandChoice, TorqueError, choose_band, torque_error
 from casysid.identification.passes import Passes
 from casysid.recording import Source
+from casysid.recording.even_stamps import evened
 from casysid.robot import Robot
 from casysid.signals.admission import check_recordings
 from casysid.threads import single_threaded
@@ -87,6 +88,7 @@ def validate(
     earlier = earlier or EarlierResult()
     model = earlier.friction or FrictionModel(DEFAULT_FRICTION, _couplings(robot, earlier.drives))
     check_recordings(recordings, cutoff=cutoff or earlier.cutoff, time_scale=earlier.time_scale)
+    recordings = evened(recordings)
     late = np.array([earlier.delays.get(dof, 0.0) for dof in robot.dofs])
     recordings = [recording.flipped(earlier.flip).with_time_scaled(earlier.time_scale) for recording in recordings]
     choice = choose_band(recordings, cutoff or earlier.cutoff)

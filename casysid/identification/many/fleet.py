@@ -13,6 +13,7 @@ import numpy as np
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
 from casysid.errors import SolverError
+from casysid.identification.choosing import Progress
 from casysid.identification.many.differences import Difference, Drift, difference, drift
 from casysid.identification.many.logs import BY_RECORDING, Logs
 from casysid.identification.many.pipeline import prepare_many
@@ -20,7 +21,7 @@ from casysid.identification.many.quantities import Quantities, quantities_of
 from casysid.identification.many.workers import Workers, open_workers
 from casysid.identification.order import as_given
 from casysid.identification.passes import added
-from casysid.identification.pipeline import Progress, fit, silent, solve
+from casysid.identification.pipeline import fit, silent, solve
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 from casysid.moments import Moments

@@ -10,9 +10,10 @@ from __future__ import annotations
 from contextlib import nullcontext
 from dataclasses import dataclass
 
+from casysid.identification.choosing import Progress
 from casysid.identification.many.logs import Logs, Opened, find_logs, open_logs
 from casysid.identification.many.workers import Workers, open_workers
-from casysid.identification.pipeline import Preparation, Progress, prepare, silent, solve
+from casysid.identification.pipeline import Preparation, prepare, silent, solve
 from casysid.identification.result import IdentificationResult
 from casysid.identification.settings import Settings
 from casysid.recording import Declared
