@@ -35,12 +35,12 @@ from casysid.excitation import (
     design_excitation,
     verify_recorded,
 )
-from casysid.excitation.feasible import find_standing, random_start, small_start
-from casysid.excitation.program import Evaluation
-from casysid.excitation.repair import shrunk
-from casysid.excitation.search import STRIDE
-from casysid.excitation.series import Motion
-from casysid.excitation.watching import on_grid
+from casysid.excitation.motion.fourier import Motion
+from casysid.excitation.search.constraint_sampling import on_grid
+from casysid.excitation.search.initial import find_standing, random_start, small_motion
+from casysid.excitation.search.program import Evaluation
+from casysid.excitation.search.scaling import scaled_to_feasible
+from casysid.excitation.search.search import STRIDE
 from casysid.robot import Robot
 from casysid.simulation import Mechanics
 from casysid.simulation.truth import drive_parameters, felt_inertia, true_parameters
@@ -67,7 +67,7 @@ def gradient_error(problem, seed=0):
     """Largest relative error of objective's and constraints' slopes along a random direction."""
     rng = np.random.default_rng(seed)
     evaluation = Evaluation(problem)
-    x = small_start(problem, find_standing(problem, seed), seed)
+    x = small_motion(problem, find_standing(problem, seed), seed)
     direction, h = rng.normal(size=len(x)), 1e-6
     gradient = evaluation.gradient(x)
     jacobian = np.zeros((len(evaluation.constraints(x)), len(x)))
@@ -149,7 +149,7 @@ def slsqp(problem, seconds):
         if time.process_time() - began > seconds:
             raise StopIteration
 
-    x = small_start(problem, standing, 0)
+    x = small_motion(problem, standing, 0)
     while time.process_time() - began < seconds:
         latest = [x]
         with contextlib.suppress(StopIteration):
@@ -162,7 +162,7 @@ def slsqp(problem, seconds):
                 constraints={"type": "ineq", "fun": room},
             )
             latest, ends = [answer.x], ends + 1
-        smaller = shrunk(problem, latest[0])
+        smaller = scaled_to_feasible(problem, latest[0])
         if smaller is not None and (value := evaluation.objective(smaller[0])) < best[0]:
             best = value, quality(problem, problem.trajectory(smaller[0]))
         drawn = random_start(problem, evaluation, standing, rng)

@@ -27,8 +27,8 @@ import numpy as np
 from casysid.bundled import find_model
 from casysid.errors import CasysidWarning
 from casysid.excitation import build_excitation, choose_series, limits_of
-from casysid.excitation.feasible import find_standing, random_start
-from casysid.excitation.program import Evaluation
+from casysid.excitation.search.initial import find_standing, random_start
+from casysid.excitation.search.program import Evaluation
 from casysid.identification import identify
 from casysid.robot import Robot
 from casysid.simulation import PD, PLAIN_MECHANICS, ControlModel, PlantSettings, design_sinusoids

@@ -62,12 +62,20 @@ def test_imports_go_one_way(path):
             assert LEVEL[parts[1]] <= own, f"{path.name} imports {module}, which comes after it"
 
 
-@pytest.mark.parametrize("rooms", [("recording", "readers"), ("identification",), ("estimation",)])
+@pytest.mark.parametrize("rooms", [("recording", "readers"), ("identification",), ("estimation",), ("excitation",)])
 def test_no_file_imports_itself_through_others(rooms):
     files = {".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): path for path in FILES}
     inside = {name: path for name, path in files.items() if room_of(path) in rooms}
     graph = {name: (imported_modules(path) - typed_only(path)) & inside.keys() for name, path in inside.items()}
     TopologicalSorter(graph).prepare()  # raises CycleError, which names the files
+
+
+def test_rooms_of_excitation_import_those_before_them_only():
+    order = ("motion", "constraints", "design", "search", "playing")
+    for path in (PACKAGE / "excitation").glob("*/*.py"):
+        later = order[order.index(path.parent.name) + 1 :]
+        for module in imported_modules(path):
+            assert not module.startswith(tuple(f"casysid.excitation.{room}" for room in later)), path
 
 
 def typed_only(path: Path) -> set[str]:

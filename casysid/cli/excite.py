@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -30,9 +30,10 @@ if TYPE_CHECKING:
         FourierSeries,
         HalfSpace,
         JointLimits,
-        KeepInBlock,
+        KeepInConstraint,
+        PlayedMotion,
     )
-    from casysid.excitation.results import Progress
+    from casysid.excitation.design.result import Progress
     from casysid.outputs import Stage
     from casysid.recording import Declared
     from casysid.robot import Robot
@@ -75,7 +76,13 @@ def excite(
     velocity_share: Annotated[float, typer.Option(help="Share of the velocity limits to use.")] = 0.9,
     torque_share: Annotated[float, typer.Option(help="Share of the effort limits to use.")] = 0.7,
     clearance: Annotated[float, typer.Option(help="Distance to keep between links and to the floor [m].")] = 0.01,
-    floor: Annotated[float | None, typer.Option(help="Height of a floor to stay above [m].")] = None,
+    floor: Annotated[
+        str,
+        typer.Option(
+            metavar="mount|none|Z",
+            help="Floor to stay above: what the base stands on, none, or one at a height [m].",
+        ),
+    ] = "mount",
     box: Annotated[
         list[str] | None, typer.Option(metavar="X,Y,Z,X,Y,Z", help="Corners of an obstacle [m]. Repeatable.")
     ] = None,
@@ -90,6 +97,13 @@ def excite(
     start: Annotated[
         str | None, typer.Option(metavar="Q1,Q2,...", help="Positions to start from [rad, m]; default: free.")
     ] = None,
+    present: Annotated[
+        str | None,
+        typer.Option(
+            "--from", metavar="Q1,Q2,...", help="Where the robot is [rad, m]: adds the way to the start, and back."
+        ),
+    ] = None,
+    speed: Annotated[float, typer.Option(help="Play the same path at this share of its speed, for a first try.")] = 1.0,
     starts: Annotated[int, typer.Option(help="Starts of the search.")] = 4,
     seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
     units: UnitsOption = None,
@@ -107,13 +121,15 @@ def excite(
     from casysid.cli.console import SOLVER_FAILED, progress_bar, say, speaking, tell_path
 
     with speaking() as console:
-        from casysid.excitation import DesignStatus, build_excitation, describe, design_set, limits_of
-        from casysid.excitation.output import add_excitation, identity_of
+        from casysid.excitation import DesignStatus, build_excitation, design_set, limits_of
+        from casysid.excitation.playing.files import add_excitation, identity_of
         from casysid.outputs import check_run_folder
         from casysid.report.excitation_pictures import add_excitation_pictures
+        from casysid.report.excitation_preview import add_excitation_preview
 
         check_options(period=period, harmonics=harmonics, periods=periods, count=count, rate=rate, starts=starts)
-        check_options(acceleration=acceleration, jerk=jerk, clearance=clearance, floor=floor, seed=seed)
+        height = _floor(floor)
+        check_options(acceleration=acceleration, jerk=jerk, clearance=clearance, seed=seed, speed=speed)
         check_options(velocity_share=velocity_share, torque_share=torque_share)
         check_run_folder(out, ["excitation.csv", "excitation.json", "joint_trajectory.yaml", "excitation.txt"])
         said = declared_of(units, columns, motor_constant, gear, efficiency)
@@ -134,7 +150,8 @@ def excite(
             rate=rate,
             limits=limits,
             clearance=clearance,
-            obstacles=obstacles_of(floor, wall or [], box or []),
+            obstacles=obstacles_of(None, wall or [], box or []),
+            floor=height,
             keep_in=_keep_in(model, keep_in or []),
             start=None if start is None else numbers("--start", start, model.nv),
         )
@@ -144,18 +161,18 @@ def excite(
             if any(design.status is DesignStatus.INTERRUPTED for design in designs):
                 raise KeyboardInterrupt
             progress("write", 0.0)
-            with console.run_folder(out, identity_of(designs[0])) as stage:
+            designs = tuple(design.at_speed(speed) for design in designs)
+            whole = [_played(design, present, speed) for design in designs]
+            with console.run_folder(out, identity_of(designs[0], whole[0])) as stage:
                 stages = _stages(stage, len(designs))
-                for design, own in zip(designs, stages, strict=True):
-                    add_excitation(design, own)
+                for design, played, own in zip(designs, whole, stages, strict=True):
+                    add_excitation(design, own, played=played)
                     add_excitation_pictures(design, own)
-                undrawn = _preview(designs, stages)
-        for design, own in zip(designs, stages, strict=True):
-            for line in describe(design):
+                    add_excitation_preview(design, own, played=played)
+        for own in stages:
+            for line in (own.home / "excitation.txt").read_text(encoding="utf-8").splitlines():
                 say(console, f"  · {line}")
             tell_path(own.home / "excitation.csv")
-        if undrawn:
-            say(console, f"  · {undrawn}")
     if any(design.status is not DesignStatus.CONVERGED for design in designs):
         sys.exit(SOLVER_FAILED)
 
@@ -187,7 +204,7 @@ def obstacles_of(floor: float | None, walls: list[str], boxes: list[str]) -> lis
     return found
 
 
-def _keep_in(robot: Robot, texts: list[str]) -> list[KeepInBlock]:
+def _keep_in(robot: Robot, texts: list[str]) -> list[KeepInConstraint]:
     from casysid.excitation import keep_in
 
     found = []
@@ -218,17 +235,21 @@ def _informed(
     return after_recordings(problem, read_recordings(recordings, robot, declared)) if recordings else problem
 
 
-def _preview(designs: tuple[ExcitationDesign, ...], stages: list[Stage]) -> str:
-    """Draw the robot on its motions; what is in the way of that, if anything."""
-    from casysid.errors import MissingExtraError
-    from casysid.report.excitation_preview import add_excitation_preview
+def _floor(text: str) -> float | Literal["mount"] | None:
+    """What ``--floor`` says."""
+    if text == "mount":
+        return "mount"
+    return None if text == "none" else numbers("--floor", text, 1)[0]
 
-    try:
-        for design, stage in zip(designs, stages, strict=True):
-            add_excitation_preview(design, stage)
-    except MissingExtraError as error:
-        return f"No preview.png: {error}."
-    return ""
+
+def _played(design: ExcitationDesign, present: str | None, speed: float) -> PlayedMotion:
+    """The motion, with the way to it where it is said where the robot is."""
+    from casysid.excitation import PlayedMotion, find_way
+
+    if present is None:
+        return PlayedMotion(design.trajectory)
+    here = numbers("--from", present, design.problem.robot.nv)
+    return PlayedMotion(design.trajectory, find_way(design.problem, here, design.trajectory.start, speed=speed))
 
 
 def _watch(progress: Callable[[str, float], None]) -> Progress:

@@ -53,6 +53,8 @@ RANGES: Mapping[str, Range] = {
     "--box": Range(-1e4, 1e4, " m", "ten kilometres"),
     "--wall": Range(-1e4, 1e4, " m", "ten kilometres"),
     "--keep-in": Range(-1e4, 1e4, " m", "ten kilometres"),
+    "--from": Range(-1e4, 1e4, " rad or m", "a thousand turns, ten kilometres"),
+    "--speed": Range(0.01, 1.0, "", "a hundredth takes minutes; above 1 is beyond the limits"),
     "--start": Range(-1e4, 1e4, " rad or m", "a thousand turns, ten kilometres"),
     "--at": Range(-1e4, 1e4, " m", "ten kilometres"),
     "--look-at": Range(-1e4, 1e4, " m", "ten kilometres"),

@@ -120,6 +120,9 @@ class Bulk:
             with self._engines.lent(len(piece)) as engine:
                 return consume(_run(engine, inputs, piece), piece)
 
+        if len(pieces) == 1:  # no thread is started for it
+            yield pieces[0][0], work(pieces[0][1])
+            return
         with ThreadPoolExecutor(threads) as pool:
             pending: deque[tuple[int, Future[Result]]] = deque()
             for number, piece in pieces:

@@ -4,26 +4,30 @@ Build a problem (:func:`build_excitation`), then design (:func:`design_excitatio
 a grid ten times finer than the one it was optimised on, and can check itself again.
 """
 
-from casysid.excitation.building import build_excitation, choose_series, keep_in
-from casysid.excitation.capsules import Capsule, capsules_of
-from casysid.excitation.cartesian_blocks import KeepInBlock
-from casysid.excitation.clearance import Box, HalfSpace
-from casysid.excitation.criteria import AOptimal, Balanced, ConditionNumber, Criterion, DOptimal
-from casysid.excitation.design import design_excitation, design_set
-from casysid.excitation.earlier import after_recordings, after_result
-from casysid.excitation.limits import JointLimits, limits_of
-from casysid.excitation.output import write_excitation
-from casysid.excitation.problem import ExcitationProblem, parameter_accuracy, torque_accuracy
-from casysid.excitation.results import DesignStatus, DesignStep, ExcitationDesign, StartReport
-from casysid.excitation.series import ExcitationTrajectory, FourierSeries
-from casysid.excitation.verification import Margin, Verification, verify, verify_recorded
-from casysid.excitation.words import describe, information_groups
+from casysid.excitation.constraints.capsules import Capsule, capsules_of
+from casysid.excitation.constraints.keep_in import KeepInConstraint, keep_in
+from casysid.excitation.constraints.obstacles import Box, HalfSpace
+from casysid.excitation.design.building import build_excitation, choose_series
+from casysid.excitation.design.criteria import AOptimal, Balanced, ConditionNumber, Criterion, DOptimal
+from casysid.excitation.design.prior import after_recordings, after_result
+from casysid.excitation.design.problem import ExcitationProblem, parameter_accuracy, torque_accuracy
+from casysid.excitation.design.result import DesignStatus, DesignStep, ExcitationDesign, StartReport
+from casysid.excitation.design.summary import describe, information_groups
+from casysid.excitation.design.verification import Margin, Verification, verify, verify_recorded
+from casysid.excitation.motion.fourier import ExcitationTrajectory, FourierSeries
+from casysid.excitation.motion.limits import JointLimits, limits_of
+from casysid.excitation.playing.collisions import CollisionCheck, check_collisions
+from casysid.excitation.playing.files import write_excitation
+from casysid.excitation.playing.played import PlayedMotion
+from casysid.excitation.playing.way import Way, find_way
+from casysid.excitation.search.design import design_excitation, design_set
 
 __all__ = [
     "AOptimal",
     "Balanced",
     "Box",
     "Capsule",
+    "CollisionCheck",
     "ConditionNumber",
     "Criterion",
     "DOptimal",
@@ -35,18 +39,22 @@ __all__ = [
     "FourierSeries",
     "HalfSpace",
     "JointLimits",
-    "KeepInBlock",
+    "KeepInConstraint",
     "Margin",
+    "PlayedMotion",
     "StartReport",
     "Verification",
+    "Way",
     "after_recordings",
     "after_result",
     "build_excitation",
     "capsules_of",
+    "check_collisions",
     "choose_series",
     "describe",
     "design_excitation",
     "design_set",
+    "find_way",
     "information_groups",
     "keep_in",
     "limits_of",

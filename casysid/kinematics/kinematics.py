@@ -23,6 +23,7 @@ from casysid.threads import single_threaded
 
 _INPUTS = {
     "pose": ("q",),
+    "link_poses": ("q",),
     "jacobian": ("q",),
     "velocity": ("q", "v"),
     "center_of_mass": ("q", "theta"),
@@ -99,6 +100,10 @@ class Kinematics:
         chosen = self.frame(frame)
         return self._kept("pose", chosen, make=lambda: symbolic.frame_pose(self.robot, chosen, self._q)._asdict())
 
+    def link_poses_function(self) -> Any:
+        """``casadi.Function`` ``(q) -> poses``, shape (3, 4 n): rotation and translation of every child frame."""
+        return self._kept("link_poses", make=lambda: {"poses": symbolic.link_poses(self.robot, self._q)})
+
     def jacobian_function(self, frame: str | Frame, axes: Axes = Axes.WORLD) -> Any:
         """``casadi.Function`` ``(q) -> J``, shape (6, nv)."""
         return self._kept("jacobian", self.frame(frame), axes, make=lambda: {"J": self._jacobian(frame, axes)})
@@ -135,6 +140,12 @@ class Kinematics:
         values = self._values(self.pose_function(frame), q)
         columns = values[..., :9].reshape(*values.shape[:-1], 3, 3)
         return Pose(np.swapaxes(columns, -1, -2), values[..., 9:])
+
+    def link_poses(self, q: npt.ArrayLike) -> Pose:
+        """Where every joint's child frame is, its link's: rotations (..., n, 3, 3), translations (..., n, 3)."""
+        values = self._values(self.link_poses_function(), q)
+        values = values.reshape(*values.shape[:-1], -1, 4, 3)
+        return Pose(np.swapaxes(values[..., :3, :], -1, -2), values[..., 3, :])
 
     def jacobians(self, frame: str | Frame, q: npt.ArrayLike, axes: Axes = Axes.WORLD) -> Array:
         """What takes joint velocities to the frame's spatial velocity, shape (..., 6, nv)."""

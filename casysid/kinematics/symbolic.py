@@ -31,6 +31,11 @@ def frame_pose(robot: Robot, frame: Frame, q: Any) -> Placement:
     return local if frame.joint == WORLD else world_placements(robot, q)[frame.joint] @ local
 
 
+def link_poses(robot: Robot, q: Any) -> Any:
+    """Rotation and translation of every joint's child frame side by side, shape (3, 4 n)."""
+    return ca.horzcat(*(part for pose in world_placements(robot, q) for part in pose))
+
+
 def frame_jacobian(robot: Robot, frame: Frame, q: Any, axes: Axes) -> Any:
     """``J``, shape (6, nv): the frame's spatial velocity, linear before angular, is ``J v``."""
     if frame.joint == WORLD:

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.excitation.clearance import Clearance
+from casysid.excitation.constraints.clearance import Clearance
 from casysid.kinematics.sampling import position_range
 from casysid.nlp import NlpSettings, NonlinearProgram, build_nlp, solve_nlp
 from casysid.reaching.distances import distances

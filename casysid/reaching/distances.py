@@ -12,7 +12,7 @@ import casadi as ca
 
 from casysid.dynamics.symbolic import world_placements
 from casysid.excitation import Box, Capsule, HalfSpace
-from casysid.excitation.clearance import Clearance
+from casysid.excitation.constraints.clearance import Clearance
 from casysid.kinematics.frames import WORLD
 from casysid.robot import Robot
 
@@ -33,7 +33,10 @@ def distances(robot: Robot, q: Any, clearance: Clearance) -> Any:
 
     placed = [ends(capsule) for capsule in clearance.capsules]
     radius = [capsule.radius for capsule in clearance.capsules]
-    found = [_between(*placed[i], *placed[k]) - radius[i] - radius[k] for i, k in clearance.pairs]
+    found = [
+        _between(*placed[i], *placed[k]) - radius[i] - radius[k] + allowance
+        for (i, k), allowance in zip(clearance.pairs, clearance.allowance.tolist(), strict=True)
+    ]
     for i, k in clearance.meetings:
         obstacle = clearance.obstacles[k]
         a, b = placed[i]

@@ -9,7 +9,9 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.errors import ParameterError
 from casysid.excitation import Capsule, capsules_of
-from casysid.excitation.clearance import Clearance, Obstacle, build_clearance
+from casysid.excitation.constraints.clearance import Clearance, build_clearance
+from casysid.excitation.constraints.obstacles import Obstacle
+from casysid.excitation.constraints.solids import read_geometry
 from casysid.kinematics import random_configurations
 from casysid.robot import Robot
 from casysid.robot.coordinates import channels_from_configuration
@@ -49,8 +51,9 @@ class Guard:
                 "give no capsules (capsules=()) and no obstacles"
             )
         samples = self._positions(random_configurations(robot, np.random.default_rng(0), _SAMPLES))
-        around = capsules_of(robot) if capsules is None else tuple(capsules)
-        found = build_clearance(robot, around, obstacles, samples, margin)
+        solids = read_geometry(robot).solids if capsules is None else ()
+        around = capsules_of(robot, solids) if capsules is None else tuple(capsules)
+        found = build_clearance(robot, around, obstacles, samples, margin, solids)
         if len(found):
             self.clearance, self.near = found, found.near(samples, margin)
 

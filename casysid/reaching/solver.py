@@ -12,7 +12,7 @@ import numpy.typing as npt
 from casysid.arrays import Array
 from casysid.errors import ParameterError
 from casysid.excitation import Capsule
-from casysid.excitation.clearance import Obstacle
+from casysid.excitation.constraints.obstacles import Obstacle
 from casysid.kinematics import Kinematics
 from casysid.kinematics.checks import checked_states
 from casysid.reaching.constrained import ConstrainedProblem

@@ -9,7 +9,7 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.excitation import ExcitationDesign, information_groups
-from casysid.excitation.output import expected_torque, identity_of
+from casysid.excitation.playing.files import expected_torque, identity_of
 from casysid.outputs import Stage, run_folder
 from casysid.report.labels import as_label
 from casysid.report.pictures import MEASURED, PREDICTED, RESIDUAL, figure, write_png
@@ -82,7 +82,7 @@ def torque_figure(design: ExcitationDesign) -> Any:
 
 def distance_figure(design: ExcitationDesign) -> Any:
     """The six least distances, with what is to be kept; None when none are."""
-    blocks = [block for block in design.problem.blocks if block.kind == "distance"]
+    blocks = [one for one in design.problem.constraints if one.kind == "distance"]
     if not blocks:
         return None
     time, motion = _motion(design)

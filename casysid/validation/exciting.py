@@ -7,7 +7,7 @@ import enum
 import numpy as np
 
 from casysid.excitation import FourierSeries, build_excitation, choose_series, design_set, limits_of
-from casysid.excitation.results import Progress
+from casysid.excitation.design.result import Progress
 from casysid.robot import Robot
 from casysid.simulation.reference import Trajectory
 from casysid.simulation.trajectories import design_sinusoids

@@ -11,7 +11,7 @@ import numpy as np
 from casysid.arrays import Array
 from casysid.errors import ParameterError
 from casysid.excitation import ExcitationDesign, ExcitationProblem, ExcitationTrajectory, Verification, verify_recorded
-from casysid.excitation.series import Motion
+from casysid.excitation.motion.fourier import Motion
 from casysid.simulation import IDEAL, PD, ControlModel, Plant, Reference, SimulatedRun
 from casysid.threads import single_threaded
 from casysid.validation.tracking import track

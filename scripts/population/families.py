@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from casysid.excitation import FourierSeries, JointLimits, build_excitation, design_excitation
-from casysid.excitation.series import ExcitationTrajectory
+from casysid.excitation.motion.fourier import ExcitationTrajectory
 from casysid.robot import Robot
 from population.drawing import chance, log_uniform, pick
 from population.mechanisms import Mechanism

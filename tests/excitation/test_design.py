@@ -27,8 +27,8 @@ from casysid.excitation import (
     torque_accuracy,
     write_excitation,
 )
-from casysid.excitation.output import sample_recording
-from casysid.excitation.words import expected_std
+from casysid.excitation.design.summary import expected_std
+from casysid.excitation.playing.files import sample_recording
 from casysid.moments import Moments
 from casysid.moments_file import write_moments
 from casysid.recording import read_recording
@@ -66,8 +66,8 @@ def test_the_design_converges_and_keeps_every_limit_between_the_instants_it_was_
 
 
 def test_the_design_tells_more_than_random_motions_do(design, problem):
-    from casysid.excitation.feasible import find_standing, random_start
-    from casysid.excitation.program import Evaluation
+    from casysid.excitation.search.initial import find_standing, random_start
+    from casysid.excitation.search.program import Evaluation
 
     evaluation, rng = Evaluation(problem), np.random.default_rng(5)
     standing = find_standing(problem, 0)

@@ -1,0 +1,1 @@
+"""Motions along finite Fourier series, and what each joint may do."""
