@@ -25,7 +25,7 @@ class OutputError(CasysidError):
 
 
 class SolverError(CasysidError):
-    """A numerical solver ended without an answer that can be stood by."""
+    """A numerical solver ended without a usable solution."""
 
 
 class MissingExtraError(CasysidError, ImportError):

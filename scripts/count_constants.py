@@ -1,4 +1,4 @@
-"""The numeric constants of the chain of decisions, counted in the source and held against docs/decisions.md.
+"""The numeric constants of the chain of decisions, counted in the source and compared with docs/decisions.md.
 
     python scripts/count_constants.py [--list]
 

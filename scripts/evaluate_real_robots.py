@@ -109,7 +109,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     parser.add_argument("--methods", default="all", help="names with commas between them, or all")
-    parser.add_argument("--judged", default="eiv", help="the method that is held against the best of the others")
+    parser.add_argument("--judged", default="eiv", help="the method that is compared with the best of the others")
     parser.add_argument("--consistency", choices=["none", "inertia", "full"], default="full")
     parser.add_argument("--robots", default=",".join(trial.folder for trial in TRIALS))
     parser.add_argument("--friction", choices=["plain", "auto"], default="auto")

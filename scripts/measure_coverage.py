@@ -152,7 +152,7 @@ def settings_of(case: Case) -> dict[str, Settings]:
 
 @cache
 def unseen_recording(name: str, dry: bool) -> Recording:
-    """What torque bands are held against: a motion that no model was fitted to."""
+    """What torque bands are compared with: a motion that no model was fitted to."""
     return record(case_of(name, dry), UNSEEN_SEED)
 
 

@@ -1,4 +1,4 @@
-"""Tables of a TOML file, held against what they may contain: unknown keys are refused with the nearest known one."""
+"""Tables of a TOML file, compared with what they may contain: unknown keys are refused with the nearest known one."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The whole experiment rehearsed in simulation, where the truth is known, before the real robot moves.
 
 A machine that differs from its file, by as much as machines do, is excited, recorded through imperfect sensors, and
-identified by the ordinary pipeline; then what came out is held against what was hidden.
+identified by the ordinary pipeline; then what came out is compared with what was hidden.
 """
 
 from __future__ import annotations

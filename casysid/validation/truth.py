@@ -1,4 +1,4 @@
-"""Identified parameters held against true ones, in the combinations that the torque depends on."""
+"""Identified parameters compared with true ones, in the combinations that the torque depends on."""
 
 from __future__ import annotations
 

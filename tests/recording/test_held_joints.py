@@ -1,4 +1,4 @@
-"""A lock is held against what the log shows of the joint."""
+"""A lock is compared with what the log shows of the joint."""
 
 import numpy as np
 import pytest
