@@ -193,6 +193,7 @@ class Regressor:
         a: npt.ArrayLike,
         *,
         time: npt.ArrayLike | None = None,
+        histories: tuple[Array, ...] | None = None,
     ) -> Array:
         """Torques at every sample, shape (N, nv), in memory of that size.
 
@@ -202,11 +203,13 @@ class Regressor:
             v: Velocities, shape (N, nv).
             a: Accelerations, shape (N, nv).
             time: As for :meth:`histories`.
+            histories: What these gave, where several vectors of parameters are asked; None asks.
 
         Raises:
             ParameterError: When a shape does not fit.
         """
-        return self._settled(self.template.torques).evaluate(q, v, a, parameters, *self.histories(q, time))
+        remembered = self.histories(q, time) if histories is None else histories
+        return self._settled(self.template.torques).evaluate(q, v, a, parameters, *remembered)
 
 
 def build_regressor(

@@ -88,9 +88,9 @@ def error_sums(
     tables = [ErrorSums() for _ in parameters]
     for place, motion in enumerate(motions):
         inner = motion.settled if motion.settled.any() else np.ones(len(motion), dtype=bool)
-        weights = averages_of(motion, cutoff)
+        weights, remembered = averages_of(motion, cutoff), regressor.histories(motion.q, motion.time)
         for table, theta in zip(tables, parameters, strict=True):
-            predicted = regressor.predict(theta, motion.q, motion.v, motion.a, time=motion.time)
+            predicted = regressor.predict(theta, motion.q, motion.v, motion.a, histories=remembered)
             table.add(motion, predicted, inner, weights, curves=curves is None or place < curves)
     return tables
 

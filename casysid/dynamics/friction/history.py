@@ -61,7 +61,9 @@ class Play(History):
         stretch = [0.0]
         for moved in np.diff(x[turns]).tolist():
             stretch.append(min(max(stretch[-1] + moved, -1.0), 1.0))
-        last = np.searchsorted(turns, np.arange(len(x)), side="right") - 1
+        turned = np.zeros(len(x), dtype=np.intp)
+        turned[turns] = 1
+        last = np.cumsum(turned) - 1
         return np.asarray(np.clip(np.array(stretch)[last] + x - x[turns[last]], -1.0, 1.0))
 
     def slid(self, velocity: Any) -> Any:
