@@ -39,6 +39,8 @@ MOVED_COLUMNS = 0.5
 EXPLAINED, PLAUSIBLE = 0.1, 0.5
 """Share of the torque's energy that no joint leaves more of, and mean square deviation of bodies from the file's in
 its usual errors, where no order of columns is doubted."""
+MOST_ORDERED = 12
+"""Joints whose orders are searched: the neighbours of an order, each a prediction, grow with the square and more."""
 CONVINCING = 0.7
 """Share of the variance of the torques concerned that another order or gravity must explain."""
 DEGREE = np.pi / 180.0
@@ -181,7 +183,7 @@ class _Search:
     def _may_be_permuted(self, fit: GravityChoice) -> bool:
         """Whether some joint is not explained by bodies that are anywhere near the file's."""
         near = fit.strain <= PLAUSIBLE and bool((fit.unexplained <= EXPLAINED).all())
-        return len(self._joints) > 1 and not near
+        return 1 < len(self._joints) <= MOST_ORDERED and not near
 
     def _permuted(self) -> Iterator[_Reading]:
         """Readings of other orders of the columns that are clearly better; of alike ones the bodies' choice first."""
