@@ -52,8 +52,9 @@ class Mistake:
         kind: What was mistaken.
         joints: Whose columns; of all joints where gravity is the mistake.
         amount: Degrees of a shifted zero or of gravity's turn, factor of a scale; 0 for the others.
-        gain: By how much the logarithms of the joints' residual energies sink, summed.
-        explained: Share of the torque's variance that the file explains of these joints, mean: as logged, corrected.
+        gain: Evidence for it [nats].
+        explained: Share of the torque's variance that bodies near the file's explain of these joints, mean: as logged,
+            corrected.
         alternatives: Other readings that do nearly as well, in words.
         order: Of permuted columns, for each of ``joints`` the column that holds its values.
         gravity: That the log asks for [m/s²]; empty where gravity is not the mistake.
@@ -82,8 +83,8 @@ class Mistake:
         others = f" (or else: {'; '.join(self.alternatives)})" if self.alternatives else ""
         before, after = self.explained
         return (
-            f"{self.words}{others}. The model file explains {before:.1%} of that torque's variance as logged, "
-            f"{after:.1%} so corrected. Nothing was changed; {self._remedy}"
+            f"{self.words}{others}. Bodies near the model file's explain {before:.1%} of that torque's variance as "
+            f"logged, {after:.1%} so corrected. Nothing was changed; {self._remedy}"
         )
 
     @property
