@@ -199,6 +199,22 @@ def test_any_order_of_the_columns_is_named_with_its_signs(seed):
     assert truth.words in (mistake.words, *mistake.alternatives)  # the head's two eyes are alike
 
 
+@pytest.mark.parametrize("factor", [0.1, 10.0])
+def test_torques_that_are_currents_are_doubted_even_at_rest(factor):
+    robot, rng = bundled_robot("arm.urdf"), np.random.default_rng(0)
+    regressor = build_regressor(robot)
+    q, still = np.tile(rng.uniform(-1.0, 1.0, robot.nq), (400, 1)), np.zeros((400, robot.nv))
+    q = q + 1e-5 * rng.normal(size=q.shape)
+    tau = factor * regressor.predict(regressor.prior, q, still, still)
+    tau += 0.01 * np.abs(tau).max() * rng.normal(size=tau.shape)
+    log = Recording(
+        channels=robot.channels, dofs=robot.dofs, position=q, velocity=still, acceleration=still, torque=tau
+    )
+    (mistake,) = search(with_wrong_masses(robot, 0), log)
+    assert mistake.kind is MistakeKind.ALL_SCALED
+    assert mistake.amount == pytest.approx(factor, rel=0.4)
+
+
 def test_two_mistakes_are_found_one_after_the_other():
     robot, log = bundled_robot("head.urdf"), clean_log("head.urdf")
     mistakes = search(robot, changed(log, tau=lambda tau: [negate(1)(tau), negate(2)(tau)]))

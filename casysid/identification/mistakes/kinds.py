@@ -19,8 +19,13 @@ class MistakeKind(enum.Enum):
     ZERO_SHIFTED = "the zero of {0} looks {amount:+.0f} degrees away from the file's"
     DEGREES = "q looks like degrees"
     SCALE = "tau of {0} is {amount:.3g} times what the file's masses can mean: in other units, or at the motor's side?"
+    ALL_SCALED = "the torques are {amount:.3g} times what the file's masses hold: currents, or before gears?"
     GRAVITY_ABSENT = "these torques hold no gravity: it was taken out before they were logged"
     GRAVITY_TURNED = "gravity points along {vector}, {amount:.0f} degrees from the file's: the base stands otherwise"
+
+
+SCALES = (MistakeKind.SCALE, MistakeKind.ALL_SCALED)
+"""Mistakes that only a file with true masses can tell."""
 
 
 @dataclass(frozen=True)

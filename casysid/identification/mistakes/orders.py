@@ -46,9 +46,9 @@ class OrderJudge:
         self._few = samples.rows(np.unique(np.linspace(0, len(samples.tau) - 1, ROWS).astype(np.intp)))
         self._search = OrderSearch(joints, samples, predict)
 
-    def as_logged(self) -> GravityChoice:
-        """Bodies for the order as logged, torques with the signs that the file explains better."""
-        return self.fit(self._search.turned())
+    def as_logged(self) -> Assignment:
+        """The order as logged, torques with the signs that the file explains better."""
+        return self._search.turned()
 
     def fit(self, assignment: Assignment) -> GravityChoice:
         """Bodies for all samples read in an order."""

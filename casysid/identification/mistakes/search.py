@@ -44,8 +44,13 @@ MOST_JUDGED = 6
 """Readings with one mistake that bodies are fitted to."""
 USUAL_SCALE = 8.0
 """Between a file's masses and the truth lies no larger factor; beyond it the unit of torque is doubted."""
+USUAL_TOTAL, ALIKE = 4.0, 0.9
+"""Factor between all torques and the file's likewise, which masses that are off one by one do not make together; and
+the cosine between them where they are alike."""
 MOST = 4
 """Mistakes that are told of one log: who has made more reads the log anew after mending these."""
+MOVED_COLUMNS = 0.5
+"""What every column that moves beyond two must lower the logarithms by, so that none moves for nothing."""
 EXPLAINED, EXPLAINED_SO, PLAUSIBLE = 0.01, 0.1, 0.5
 """Share of the torque's energy that no joint leaves more of, as logged or in another reading, and mean square deviation
 of bodies from the file's in its usual errors, where no order of columns is doubted."""
@@ -67,7 +72,8 @@ def find_mistakes(robot: Robot, motions: Sequence[Motion], cutoff: float | None)
     found: list[Mistake] = []
     while len(found) < MOST and (mistake := search.next_mistake()) is not None:
         found.append(mistake)
-    return (*found, *search.wrong_scales())
+    whole = search.wrong_scale_of_all()
+    return (*found, *(search.wrong_scales() if whole is None else (whole,)))
 
 
 @single_threaded()
@@ -126,6 +132,24 @@ class _Search:
         self._samples, self._gravity = best.samples, best.gravity
         self._now = self._witness.explain(self._samples, self._gravity)
         return dataclasses.replace(best.mistake, gain=gain, explained=(before, after), alternatives=alternatives)
+
+    def wrong_scale_of_all(self) -> Mistake | None:
+        """All torques many times larger or smaller than the file's, though alike: by what they hold at rest as well."""
+        predicted, tau = self._witness.predict(self._samples, self._gravity), self._samples.tau
+        largest = int(np.argmax(np.sum(tau * predicted, axis=0)))
+        several = [np.arange(self._robot.nv) != largest, np.ones(self._robot.nv, dtype=bool)]
+        for kept in several:  # one joint alone may be in other units
+            shared, size, own = (
+                float(np.sum(x[:, kept] * y[:, kept]))
+                for x, y in ((tau, predicted), (predicted, predicted), (tau, tau))
+            )
+            factor = shared / max(size, 1e-300)
+            if shared <= ALIKE * np.sqrt(size * own) or 1.0 / USUAL_TOTAL <= factor <= USUAL_TOTAL:
+                return None
+        explained = shared**2 / (size * own)
+        gain = 0.5 * self._samples.independent * abs(float(np.log(factor)))
+        kind, joints = MistakeKind.ALL_SCALED, tuple(self._places)
+        return Mistake(kind=kind, joints=joints, amount=factor, gain=gain, explained=(explained, explained))
 
     def wrong_scales(self) -> Iterator[Mistake]:
         """Joints whose torque is far from the file's in size, though alike in shape."""
@@ -193,7 +217,7 @@ class _Search:
         return 1.0 - float(np.mean(reading.bodies.unexplained[joints])) > CONVINCING
 
     def _permuted(self, now: GravityChoice) -> Iterator[_Reading]:
-        """Readings of other orders of the columns whose bodies are clearly better than of any signs in this order."""
+        """Readings of other orders that bodies and the file's own prediction clearly prefer to signs in this one."""
         judge = OrderJudge(
             self._robot,
             self._joints,
@@ -203,15 +227,18 @@ class _Search:
         )
         if len(self._joints) < 2:
             return
-        limit = min(now.cost, judge.as_logged().cost) - CLEAR_TURN
+        as_logged = judge.as_logged()
+        limit = min(now.cost, judge.fit(as_logged).cost) - CLEAR_TURN
+        signs, _ = gain_of(self._now, self._explain(reordered(self._samples, self._joints, as_logged)))
         kinds = (MistakeKind.TORQUES_PERMUTED, MistakeKind.POSITIONS_PERMUTED, MistakeKind.JOINTS_PERMUTED)
         for kind, assignments in zip(kinds, judge.best(), strict=True):
             for assignment in assignments:
-                bodies = judge.fit(assignment)
-                if bodies.cost < limit:
-                    names, order = _changes(self._joints, assignment)
+                names, order = _changes(self._joints, assignment)
+                samples, bodies = reordered(self._samples, self._joints, assignment), judge.fit(assignment)
+                gain, steadiness = gain_of(self._now, self._explain(samples))
+                price = max(signs, 0.0) + MOVED_COLUMNS * (len(names) - 2)
+                if bodies.cost < limit and gain > CLEAR + price and steadiness > STEADY:
                     mistake = Mistake(kind=kind, joints=names, order=order)
-                    samples = reordered(self._samples, self._joints, assignment)
                     yield _Reading(mistake, samples, self._gravity, bodies, bodies.cost)
 
     def _conceivable(self) -> Iterator[Mistake]:
