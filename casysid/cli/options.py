@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -115,8 +116,15 @@ GravityOption = Annotated[
         help="Gravity in the base frame [m/s²]; default: the model's. identify takes auto too: what the log asks for.",
     ),
 ]
+AUTO = "auto"
+"""In place of a joint to hold."""
 LockOption = Annotated[
-    list[str] | None, typer.Option("--lock", metavar="JOINT=VALUE", help="Hold a joint fixed [rad or m]. Repeatable.")
+    list[str] | None,
+    typer.Option(
+        "--lock",
+        metavar="JOINT=VALUE|auto",
+        help="Hold a joint fixed [rad or m]; auto: those that follow others (mimic). Repeatable.",
+    ),
 ]
 FloatingOption = Annotated[
     bool, typer.Option("--floating-base", help="The base is free to move (six more degrees of freedom).")
@@ -132,7 +140,11 @@ def load_robot(
 
     for value in gravity or ():
         checked("--gravity", value)
-    return Robot.from_file(find_model(name), gravity=gravity, floating_base=floating_base, locked=_locked(lock or []))
+    path = find_model(name)
+    locked = _locked([pair for pair in lock or [] if pair != AUTO])
+    if AUTO in (lock or []):
+        locked |= _following(path, locked)
+    return Robot.from_file(path, gravity=gravity, floating_base=floating_base, locked=locked)
 
 
 def load_recordings(
@@ -216,6 +228,23 @@ def _seconds(delay: str) -> float | None:
     return None if seconds is None else checked("--delay", seconds)
 
 
+def _following(path: Path, locked: dict[str, float]) -> dict[str, float]:
+    """Where joints that follow others are held, which is said."""
+    from casysid.errors import CasysidWarning
+    from casysid.robot.following import following_joints
+    from casysid.robot.locking import lock_words
+
+    found = following_joints(path, locked)
+    if found:
+        warnings.warn(
+            f"{path}: joints that follow others are held: {lock_words(found)}. Where those move, what these carry is "
+            "told where it is not",
+            CasysidWarning,
+            stacklevel=3,
+        )
+    return found
+
+
 def _locked(pairs: list[str]) -> dict[str, float]:
     from casysid.errors import ParameterError
 
@@ -226,7 +255,7 @@ def _locked(pairs: list[str]) -> dict[str, float]:
             position = float(value)
         except ValueError as error:
             raise ParameterError(
-                f"--lock wants JOINT=VALUE with a number, such as gripper=0.02; got {pair!r}"
+                f"--lock wants auto, or JOINT=VALUE with a number, such as gripper=0.02; got {pair!r}"
             ) from error
         locked[joint] = checked("--lock", position)
     return locked

@@ -145,8 +145,8 @@ def _refuse_mimics(joints: Iterable[UrdfJoint], held: Iterable[tuple[str, float]
         listing = ", ".join(f"joint '{joint.name}' (line {joint.element.line}) '{joint.mimics}'" for joint in coupled)
         rest = {joint.name: float(np.clip(0.0, joint.lower, joint.upper)) for joint in coupled}
         raise RobotError(
-            f"{path}: joints that mimic others are not supported: {listing}; lock them ({lock_words(rest)}), or remove "
-            "<mimic> from those that move by themselves"
+            f"{path}: joints that mimic others are not supported: {listing}; lock them ({lock_words(rest)}; or "
+            "--lock auto), or remove <mimic> from those that move by themselves"
         )
 
 

@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import nnls
 
 from casysid.dynamics import build_regressor
 from casysid.errors import CasysidWarning
 from casysid.identification import MistakeKind, Settings, choose_band, find_mistakes, identify
 from casysid.identification.mistakes import Column, Mistake
-from casysid.identification.mistakes.gravity import angle_between, gravity_torque
+from casysid.identification.mistakes.bodies import body_moments
+from casysid.identification.mistakes.gravity import GravityFit, angle_between, gravity_torque
+from casysid.identification.mistakes.samples import Samples
 from casysid.identification.passes import Passes
 from casysid.recording import Recording, read_recording
 from casysid.robot import Robot
@@ -143,6 +146,17 @@ def test_a_base_that_stands_otherwise_is_named_with_its_gravity(turned):
     assert mistake.option.startswith("--gravity ")
 
 
+@pytest.mark.parametrize(("name", "is_told"), [("two_link.urdf", False), ("arm.urdf", True)])
+def test_joints_about_one_axis_do_not_tell_the_direction_of_gravity(name, is_told):
+    robot, rng = bundled_robot(name), np.random.default_rng(0)
+    position, v, a = rng.uniform(-1.0, 1.0, (3, 300, robot.nv))
+    regressor = build_regressor(robot, ())
+    tau = regressor.predict(regressor.prior, position, v, a)
+    noise = 0.01 * tau.std(axis=0) * rng.normal(size=tau.shape)
+    fit = GravityFit(robot, Samples(position, v, a, tau + noise, 300.0))
+    assert (fit.direction_error(fit.file) < 3.0) == is_told
+
+
 def test_torque_without_gravity_is_named():
     robot, log = bundled_robot("head.urdf"), clean_log("head.urdf")
     held = gravity_torque(robot, log.position, robot.gravity)
@@ -183,6 +197,22 @@ def test_any_order_of_the_columns_is_named_with_its_signs(seed):
         order=tuple(Column(robot.dofs[order[k]], turned[k], turned[k]) for k in moved),
     )
     assert truth.words in (mistake.words, *mistake.alternatives)  # the head's two eyes are alike
+
+
+@pytest.mark.parametrize("factor", [0.1, 10.0])
+def test_torques_that_are_currents_are_doubted_even_at_rest(factor):
+    robot, rng = bundled_robot("arm.urdf"), np.random.default_rng(0)
+    regressor = build_regressor(robot)
+    q, still = np.tile(rng.uniform(-1.0, 1.0, robot.nq), (400, 1)), np.zeros((400, robot.nv))
+    q = q + 1e-5 * rng.normal(size=q.shape)
+    tau = factor * regressor.predict(regressor.prior, q, still, still)
+    tau += 0.01 * np.abs(tau).max() * rng.normal(size=tau.shape)
+    log = Recording(
+        channels=robot.channels, dofs=robot.dofs, position=q, velocity=still, acceleration=still, torque=tau
+    )
+    (mistake,) = search(with_wrong_masses(robot, 0), log)
+    assert mistake.kind is MistakeKind.ALL_SCALED
+    assert mistake.amount == pytest.approx(factor, rel=0.4)
 
 
 def test_two_mistakes_are_found_one_after_the_other():
@@ -256,3 +286,21 @@ def test_real_logs_are_not_accused(folder):
     urdf, log = LOGS[folder]
     robot = Robot.from_file(REAL / folder / urdf)
     assert search(robot, read_recording(REAL / folder / f"{log}.csv.gz", robot)) == ()
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_friction_that_feeds_energy_explains_nothing(seed):
+    robot, rng = bundled_robot("two_link.urdf"), np.random.default_rng(seed)
+    position, v, a, tau = rng.normal(size=(4, 60, 2))
+    moments = body_moments(robot, Samples(position, v, a, tau, 60.0))
+    torque_alone = np.zeros(22 * len(robot.links) + 1)
+    torque_alone[-1] = 1.0
+    for joint in range(2):
+        width = 0.01 * np.sqrt(np.mean(v[:, joint] ** 2)) + 1e-12
+        brakes = np.column_stack([v[:, joint], np.tanh(v[:, joint] / width), a[:, joint]])
+        y = tau[:, joint] - tau[:, joint].mean()
+        brakes -= brakes.mean(axis=0)
+        free = y - brakes @ np.linalg.lstsq(brakes, y, rcond=None)[0]
+        assert moments.left(torque_alone)[joint] == pytest.approx(np.mean(free**2))
+        assert moments.left_by_brakes(torque_alone)[joint] == pytest.approx(nnls(brakes, y)[1] ** 2 / 60)

@@ -14,7 +14,8 @@ from scipy.optimize import nnls
 
 from casysid.arrays import Array
 from casysid.dynamics import Armature, Regressor, build_regressor
-from casysid.identification.mistakes.gravity import friction_basis, gravity_torque
+from casysid.identification.mistakes.bodies import friction_basis
+from casysid.identification.mistakes.gravity import gravity_torque
 from casysid.identification.mistakes.samples import BLOCKS, SHARPNESS, Samples
 from casysid.robot import Robot
 

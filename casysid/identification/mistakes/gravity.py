@@ -17,7 +17,8 @@ import numpy as np
 import pinocchio as pin
 
 from casysid.arrays import Array
-from casysid.identification.mistakes.samples import SHARPNESS, Samples
+from casysid.identification.mistakes.bodies import body_moments, body_scales
+from casysid.identification.mistakes.samples import Samples
 from casysid.robot import Robot
 
 EARTH = 9.81
@@ -28,10 +29,6 @@ SIZES = (10.0, 100.0)
 """Multiples of that which the evidence may choose: placeholders are off by more."""
 FLOOR = 0.01
 """Of a joint's torque: smaller residuals are alike."""
-SMALLEST_REACH = 0.02
-"""Of a link [m]."""
-SILENT = 1e-12
-"""Share of the largest torque's energy that a joint without any torque stays below: it says nothing of gravity."""
 CLEAR_ABSENCE, CLEAR_TURN = 12.0, 40.0
 """Evidence [nats] above which gravity is missed, or found elsewhere."""
 SMALLEST_TURN = 10.0
@@ -76,21 +73,23 @@ class _Fit(NamedTuple):
 class GravityFit:
     """Second moments of a log's samples, for bodies and any gravity."""
 
-    def __init__(self, robot: Robot, samples: Samples) -> None:
+    def __init__(self, robot: Robot, samples: Samples, gravity: Array | None = None) -> None:
         """Takes the moments.
 
         Args:
             robot: Its file's bodies are the prior.
             samples: Of the log.
+            gravity: In place of the file's.
         """
         self._links = len(robot.links)
-        self._file = np.array(robot.gravity)
+        self._file = np.array(robot.gravity if gravity is None else gravity)
         self._size = float(np.linalg.norm(self._file)) or EARTH
         self._prior = robot.inertial_parameters
         self._four = np.concatenate([10 * k + np.arange(4) for k in range(self._links)])
-        self._count = samples.independent
-        self._squares, self._energy = _moments(robot, samples)
-        usual = FILES_ARE_OFF * _body_scales(robot)
+        self._count = min(samples.independent, float(len(samples.tau)))
+        self._moments = body_moments(robot, samples)
+        self._squares, self._energy = self._moments.squares, self._moments.energy
+        usual = FILES_ARE_OFF * body_scales(robot)
         self._scale = usual
         self.file = self._settled(self._file, usual)
         for size in SIZES:
@@ -154,21 +153,37 @@ class GravityFit:
 
     def _moved(self, gravity: Array, bodies: Array, weights: Array) -> Array:
         """Gravity after one step along the sphere."""
+        p = len(self._prior)
+        H, slope, along = self._curvature(gravity, bodies, weights)
+        step = along @ np.linalg.lstsq(H, slope, rcond=None)[0][p:]
+        step *= min(1.0, LONGEST_STEP / max(float(np.linalg.norm(step)), 1e-12))
+        moved = gravity + step
+        return np.asarray(moved * self._size / np.linalg.norm(moved))
+
+    def _curvature(self, gravity: Array, bodies: Array, weights: Array) -> tuple[Array, Array, Array]:
+        """Of the cost along bodies and two directions on the sphere: Gauss-Newton's matrix, slope, directions."""
         p, T = len(self._prior), self._design(gravity)
         along = np.linalg.svd(gravity[None])[2][1:].T
         B = np.zeros((len(T), 3))
         for k in range(3):
             B[p + 4 * self._links * k + np.arange(4 * self._links), k] = bodies[self._four]
         X = np.hstack([T[:, :-1] * self._scale, B @ along])
-        W = np.einsum("j,jab->ab", weights, self._squares, optimize=True)
+        W = np.tensordot(weights, self._squares, 1)
         H, slope = X.T @ W @ X, X.T @ W @ (T @ np.append(-bodies, 1.0))
         H[np.arange(p), np.arange(p)] += 1.0
         slope[:p] -= (bodies - self._prior) / self._scale
         H[np.diag_indices_from(H)] *= 1.0 + 1e-9
-        step = along @ np.linalg.lstsq(H, slope, rcond=None)[0][p:]
-        step *= min(1.0, LONGEST_STEP / max(float(np.linalg.norm(step)), 1e-12))
-        moved = gravity + step
-        return np.asarray(moved * self._size / np.linalg.norm(moved))
+        return H, slope, along
+
+    def direction_error(self, choice: GravityChoice) -> float:
+        """The larger standard error of gravity's direction, bodies being unknown as well [degrees]."""
+        variance = (choice.unexplained + FLOOR**2) * self._energy
+        fit = self._fit(choice.gravity, variance, self._scale)
+        H, _, _ = self._curvature(choice.gravity, fit.bodies, self._count / variance)
+        p = len(self._prior)
+        told = H[p:, p:] - H[p:, :p] @ np.linalg.solve(H[:p, :p], H[:p, p:])
+        least = max(float(np.linalg.eigvalsh(told)[0]), 1e-12)
+        return float(np.degrees(1.0 / (np.sqrt(least) * self._size)))
 
     def _settled(self, gravity: Array, scale: Array, rounds: int = 5) -> GravityChoice:
         """The fit at one gravity, every joint's noise its own."""
@@ -176,12 +191,14 @@ class GravityFit:
         for _ in range(rounds):
             fit = self._fit(gravity, variance, scale)
             variance = fit.residue + FLOOR**2 * self._energy
-        return GravityChoice(np.asarray(gravity), fit.cost, fit.residue / self._energy, fit.information, fit.strain)
+        braked = self._moments.left_by_brakes(self._design(gravity) @ np.append(-fit.bodies, 1.0))
+        cost = fit.cost + self._data_cost(braked) - self._data_cost(fit.residue)
+        return GravityChoice(np.asarray(gravity), cost, braked / self._energy, fit.information, fit.strain)
 
     def _fit(self, gravity: Array, variance: Array, scale: Array) -> _Fit:
         """Bodies at a gravity, given each joint's noise; sizes of the file's errors and of the noise are unknown."""
         T = self._design(gravity)
-        W = np.einsum("j,jab->ab", self._count / variance, self._squares, optimize=True)
+        W = np.tensordot(self._count / variance, self._squares, 1)
         M = T.T @ W @ T
         A = M[:-1, :-1] * np.outer(scale, scale)
         A[np.diag_indices_from(A)] += 1.0
@@ -191,7 +208,7 @@ class GravityFit:
         x = vectors @ ((vectors.T @ pull) / values)
         bodies = self._prior + scale * x
         r = T @ np.append(-bodies, 1.0)
-        residue = np.maximum(np.einsum("a,jab,b->j", r, self._squares, r, optimize=True), 0.0)
+        residue = self._moments.left(r)
         told = max(float(np.sum(1.0 - 1.0 / values)), 1.0)
         strain, information = float(x @ x) / told, 0.5 * float(np.log(values).sum())
         cost = self._data_cost(residue) + 0.5 * told * float(np.log1p(strain)) + information
@@ -234,65 +251,3 @@ def gravity_torque(robot: Robot, q: Array, gravity: Array) -> Array:
     model.gravity.linear = np.asarray(gravity, dtype=np.float64)
     data = model.createData()
     return np.array([pin.computeGeneralizedGravity(model, data, one) for one in q]).reshape(len(q), robot.nv)
-
-
-def _moments(robot: Robot, samples: Samples) -> tuple[Array, Array]:
-    """Mean squares of each joint's rows once its own friction is taken out, and of its torque about the mean."""
-    Y = np.concatenate([_columns(robot, samples), samples.tau[:, :, None]], axis=2)
-    width = SHARPNESS * np.sqrt(np.mean(samples.v**2, axis=0)) + 1e-12
-    squares = []
-    for j in range(robot.nv):
-        v, a = samples.v[:, j], samples.a[:, j]
-        X = Y[:, j]
-        basis = friction_basis(v, a, width[j])
-        X = X - basis @ (basis.T @ X)
-        squares.append(X.T @ X / len(X))
-    energy = np.var(samples.tau, axis=0)
-    silent = energy <= SILENT * energy.max()
-    squares = [np.zeros_like(square) if mute else square for square, mute in zip(squares, silent, strict=True)]
-    return np.array(squares), np.where(silent, 1.0, energy)
-
-
-def friction_basis(v: Array, a: Array, width: float) -> Array:
-    """Orthonormal columns that viscous and Coulomb friction, armature and an offset span, shape (N, up to 4)."""
-    columns = np.column_stack([np.ones(len(v)), v, np.tanh(v / width), a])
-    columns /= np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300)
-    Q, R = np.linalg.qr(columns)
-    return np.asarray(Q[:, np.abs(np.diag(R)) > 1e-8 * np.sqrt(len(v))])
-
-
-def _columns(robot: Robot, samples: Samples) -> Array:
-    """``Y₀``, then for each unit of gravity its columns of mass and first moments, shape (N, nv, 22 links)."""
-    q, links = samples.configuration(robot), len(robot.links)
-    bodies = [k for k, joint in enumerate(robot.joints) if joint.link is not None]
-    ten, four = (np.concatenate([10 * k + np.arange(n) for k in bodies]) for n in (10, 4))
-    Y = np.empty((len(q), robot.nv, 22 * links))
-    model, still = robot.model.copy(), np.zeros(robot.nv)
-    data = model.createData()
-
-    def rows(k: int, v: Array, a: Array) -> Array:
-        return np.asarray(pin.computeJointTorqueRegressor(model, data, q[k], v, a)).reshape(robot.nv, -1)
-
-    model.gravity.linear = np.zeros(3)
-    for k in range(len(q)):
-        Y[k, :, : 10 * links] = rows(k, samples.v[k], samples.a[k])[:, ten]
-    for axis in range(3):
-        model.gravity.linear = np.eye(3)[axis]
-        place = 10 * links + 4 * links * axis
-        for k in range(len(q)):
-            Y[k, :, place : place + 4 * links] = rows(k, still, still)[:, four]
-    return Y
-
-
-def _body_scales(robot: Robot) -> Array:
-    """Masses, masses times reaches and their squares, shape (10 links,)."""
-    bodies = robot.inertial_parameters.reshape(-1, 10)
-    carrying = [k for k, joint in enumerate(robot.joints) if joint.link is not None]
-    scales = np.empty_like(bodies)
-    for row, (k, body) in enumerate(zip(carrying, bodies, strict=True)):
-        mass = max(abs(float(body[0])), 1e-6)
-        below = [float(np.linalg.norm(one.placement.translation)) for one in robot.joints if one.parent == k]
-        reach = max(*below, min(float(np.linalg.norm(body[1:4])) / mass, 10.0), SMALLEST_REACH)
-        scales[row, 0], scales[row, 1:4] = mass, mass * reach
-        scales[row, 4:] = max(mass * reach**2, float(np.abs(body[4:]).max()))
-    return scales.ravel()

@@ -24,8 +24,13 @@ class MistakeKind(enum.Enum):
     ZERO_SHIFTED = "the zero of {0} looks {amount:+.0f} degrees away from the file's"
     DEGREES = "q looks like degrees"
     SCALE = "tau of {0} is {amount:.3g} times what the file's masses can mean: in other units, or at the motor's side?"
+    ALL_SCALED = "the torques are {amount:.3g} times what the file's masses hold: currents, or before gears?"
     GRAVITY_ABSENT = "these torques hold no gravity: it was taken out before they were logged"
     GRAVITY_TURNED = "gravity points along {vector}, {amount:.0f} degrees from the file's: the base stands otherwise"
+
+
+SCALES = (MistakeKind.SCALE, MistakeKind.ALL_SCALED)
+"""Mistakes that only a file with true masses can tell."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +62,9 @@ class Mistake:
         kind: What was mistaken.
         joints: Whose columns; of all joints where gravity is the mistake.
         amount: Degrees of a shifted zero or of gravity's turn, factor of a scale; 0 for the others.
-        gain: By how much the logarithms of the joints' residual energies sink, summed.
-        explained: Share of the torque's variance that the file explains of these joints, mean: as logged, corrected.
+        gain: Evidence for it [nats].
+        explained: Share of the torque's variance that bodies near the file's explain of these joints, mean: as logged,
+            corrected.
         alternatives: Other readings that do nearly as well, in words.
         order: Of permuted columns, for each of ``joints`` the column that holds its values.
         gravity: That the log asks for [m/s²]; empty where gravity is not the mistake.
@@ -88,8 +94,8 @@ class Mistake:
         before, after = self.explained
         done = "It was taken so" if self.negated_torques else "Nothing was changed"
         return (
-            f"{self.words}{others}. The model file explains {before:.1%} of that torque's variance as logged, "
-            f"{after:.1%} so corrected. {done}; {self._remedy}"
+            f"{self.words}{others}. Bodies near the model file's explain {before:.1%} of that torque's variance as "
+            f"logged, {after:.1%} so corrected. {done}; {self._remedy}"
         )
 
     @property

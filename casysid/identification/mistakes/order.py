@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from casysid.arrays import Array
-from casysid.identification.mistakes.gravity import friction_basis
+from casysid.identification.mistakes.bodies import friction_basis
 from casysid.identification.mistakes.samples import SHARPNESS, Indices, Samples
 from casysid.robot import Joint
 
@@ -28,7 +28,7 @@ RESOLUTION = 1e-3
 STARTS, AGAIN, FEW = 24, 4, 8
 """Random orders that are improved; the search ends once the best was found from so many, or after a few when none is
 better than the order as logged."""
-ALIKE, MOST_ALIKE = 0.5, 3
+ALIKE, MOST_ALIKE = 3.0, 6
 """Orders whose sums of logarithms are so near are told apart by bodies that are fitted to each; so many are."""
 INDIFFERENT = 0.1
 """Columns go home and signs go back where that raises the sum of logarithms by no more."""

@@ -15,9 +15,16 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.identification.mistakes.explanation import RESOLUTION, Explanation, Witness, gain_of, share_explained
-from casysid.identification.mistakes.gravity import CLEAR_ABSENCE, GravityChoice, GravityFit, angle_between
+from casysid.identification.mistakes.gravity import (
+    CLEAR_ABSENCE,
+    CLEAR_TURN,
+    GravityChoice,
+    GravityFit,
+    angle_between,
+)
 from casysid.identification.mistakes.kinds import Column, Mistake, MistakeKind
-from casysid.identification.mistakes.order import Assignment, OrderSearch, reordered
+from casysid.identification.mistakes.order import Assignment, reordered
+from casysid.identification.mistakes.orders import OrderJudge
 from casysid.identification.mistakes.samples import Samples, pick_samples
 from casysid.robot import Joint, JointKind, Robot
 from casysid.signals import Motion
@@ -28,21 +35,31 @@ CLEAR = 1.2
 three tenths. The eight real robots' logs, read otherwise, reach 0.7."""
 STEADY = 4.0
 """And in the mean over blocks of time by so many standard errors."""
-NEARLY = 0.9
-"""Readings that reach this share of the best one's gain are named beside it."""
+USUAL_STRAIN = 1.0
+"""Mean square deviation of bodies from the file's, in standard deviations of files: more speaks for a reading with
+less, as of a zero elsewhere, which no torque tells from a centre of mass elsewhere."""
+DIGITS = 3
+"""Of evidence [nats]: a zero of the first joint elsewhere and a base turned about it are the same."""
+MOST_JUDGED = 6
+"""Readings with one mistake that bodies are fitted to."""
 USUAL_SCALE = 8.0
 """Between a file's masses and the truth lies no larger factor; beyond it the unit of torque is doubted."""
+USUAL_TOTAL, ALIKE = 4.0, 0.9
+"""Factor between all torques and the file's likewise, which masses that are off one by one do not make together; and
+the cosine between them where they are alike."""
 MOST = 4
 """Mistakes that are told of one log: who has made more reads the log anew after mending these."""
 MOVED_COLUMNS = 0.5
 """What every column that moves beyond two must lower the logarithms by, so that none moves for nothing."""
-EXPLAINED, PLAUSIBLE = 0.1, 0.5
-"""Share of the torque's energy that no joint leaves more of, and mean square deviation of bodies from the file's in
-its usual errors, where no order of columns is doubted."""
+EXPLAINED, EXPLAINED_SO, PLAUSIBLE = 0.01, 0.1, 0.5
+"""Share of the torque's energy that no joint leaves more of, as logged or in another reading, and mean square deviation
+of bodies from the file's in its usual errors, where no order of columns is doubted."""
+MOST_DOFS = 30
+"""Of a robot whose log is judged: bodies are fitted to each reading, whose cost grows with the cube of their number."""
 MOST_ORDERED = 12
 """Joints whose orders are searched: the neighbours of an order, each a prediction, grow with the square and more."""
 CONVINCING = 0.7
-"""Share of the variance of the torques concerned that another order or gravity must explain."""
+"""Share of the variance of the torques concerned that bodies must explain in another reading."""
 DEGREE = np.pi / 180.0
 """[rad]."""
 MOVING = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
@@ -52,14 +69,17 @@ MOVING = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
 def find_mistakes(robot: Robot, motions: Sequence[Motion], cutoff: float | None) -> tuple[Mistake, ...]:
     """Mistakes that the model file's own prediction shows in motions; none when nothing is clear.
 
-    Joints of several degrees of freedom are taken as logged. A change that no torque tells, as another zero of a joint
-    with a vertical axis at the base, cannot be found.
+    Joints of several degrees of freedom, and robots of very many, are taken as logged. A change that no torque tells,
+    as another zero of a joint with a vertical axis at the base, cannot be found.
     """
+    if robot.nv > MOST_DOFS:
+        return ()
     search = _Search(robot, motions, cutoff)
     found: list[Mistake] = []
     while len(found) < MOST and (mistake := search.next_mistake()) is not None:
         found.append(mistake)
-    return (*found, *search.wrong_scales())
+    whole = search.wrong_scale_of_all()
+    return (*found, *(search.wrong_scales() if whole is None else (whole,)))
 
 
 @single_threaded()
@@ -70,13 +90,21 @@ def find_gravity(robot: Robot, motions: Sequence[Motion], cutoff: float | None) 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Reading:
-    """The log read as if a mistake had been made; ``gravity`` None is the file's."""
+    """The log read as if a mistake had been made.
+
+    Attributes:
+        mistake: What was mistaken.
+        samples: So read.
+        gravity: So read; None is the file's.
+        bodies: That explain the samples in this gravity.
+        cost: By which readings are compared: the bodies', and a price.
+    """
 
     mistake: Mistake
     samples: Samples
     gravity: Array | None
-    explanation: Explanation
-    gain: float
+    bodies: GravityChoice
+    cost: float
 
 
 class _Search:
@@ -94,25 +122,41 @@ class _Search:
 
     def next_mistake(self) -> Mistake | None:
         """The clearest mistake, corrected in the samples from now on; None when there is no clear one."""
-        judged = [reading for one in self._promising() if (reading := self._read_so(*one)) is not None]
-        fit = GravityFit(self._robot, self._samples) if self._gravity is None else None
-        if fit is not None and self._may_be_permuted(fit.file):
-            judged += self._permuted()
-        judged.sort(key=lambda one: -one.gain)
-        turned = None if fit is None else self._turned(fit)
-        if turned is not None and not (judged and self._is_better(judged[0], turned[1])):
-            judged.insert(0, turned[0])
-        if not judged:
+        fit = GravityFit(self._robot, self._samples, self._gravity)
+        turned = fit.found() if self._gravity is None else None
+        readings = [*([] if turned is None else [self._turned(turned)]), *self._single(fit.file)]
+        explained = _is_near(fit.file, EXPLAINED) or any(_is_near(one.bodies, EXPLAINED_SO) for one in readings)
+        if not explained and 1 < len(self._joints) <= MOST_ORDERED:
+            readings += self._permuted(fit.file)
+        readings = [one for one in readings if self._is_convincing(one)]
+        if not readings:
             return None
-        best, *others = judged
-        alternatives = tuple(other.mistake.words for other in others[:3] if other.gain > NEARLY * best.gain)
-        dofs = [self._places[name][1] for name in best.mistake.joints]
-        explained = (
-            share_explained(self._now, self._samples, dofs),
-            share_explained(best.explanation, best.samples, dofs),
-        )
-        self._samples, self._now, self._gravity = best.samples, best.explanation, best.gravity
-        return dataclasses.replace(best.mistake, gain=best.gain, explained=explained, alternatives=alternatives)
+        best, *others = sorted(readings, key=lambda one: round(one.cost, DIGITS))
+        alternatives = tuple(one.mistake.words for one in others[:3] if one.cost < best.cost + CLEAR_ABSENCE)
+        joints = [self._places[name][1] for name in best.mistake.joints]
+        before, after = (1.0 - float(np.mean(one.unexplained[joints])) for one in (fit.file, best.bodies))
+        gain = fit.file.cost - best.bodies.cost
+        self._samples, self._gravity = best.samples, best.gravity
+        self._now = self._witness.explain(self._samples, self._gravity)
+        return dataclasses.replace(best.mistake, gain=gain, explained=(before, after), alternatives=alternatives)
+
+    def wrong_scale_of_all(self) -> Mistake | None:
+        """All torques many times larger or smaller than the file's, though alike: by what they hold at rest as well."""
+        predicted, tau = self._witness.predict(self._samples, self._gravity), self._samples.tau
+        largest = int(np.argmax(np.sum(tau * predicted, axis=0)))
+        several = [np.arange(self._robot.nv) != largest, np.ones(self._robot.nv, dtype=bool)]
+        for kept in several:  # one joint alone may be in other units
+            shared, size, own = (
+                float(np.sum(x[:, kept] * y[:, kept]))
+                for x, y in ((tau, predicted), (predicted, predicted), (tau, tau))
+            )
+            factor = shared / max(size, 1e-300)
+            if shared <= ALIKE * np.sqrt(size * own) or 1.0 / USUAL_TOTAL <= factor <= USUAL_TOTAL:
+                return None
+        explained = shared**2 / (size * own)
+        gain = 0.5 * self._samples.independent * abs(float(np.log(factor)))
+        kind, joints = MistakeKind.ALL_SCALED, tuple(self._places)
+        return Mistake(kind=kind, joints=joints, amount=factor, gain=gain, explained=(explained, explained))
 
     def wrong_scales(self) -> Iterator[Mistake]:
         """Joints whose torque is far from the file's in size, though alike in shape."""
@@ -149,20 +193,21 @@ class _Search:
         most = np.sum(np.log(self._now.energy / size + RESOLUTION) - np.log(left + RESOLUTION), axis=1)
         return (one for one, gain in zip(zip(mistakes, readings, strict=True), most, strict=True) if gain > CLEAR / 2.0)
 
-    def _read_so(self, mistake: Mistake, read: Samples, price: float = 0.0) -> _Reading | None:
-        """The samples without the mistake, if they are explained clearly better."""
-        explanation = self._explain(read)
-        gain, steadiness = gain_of(self._now, explanation)
-        if gain - price <= CLEAR or steadiness <= STEADY:
-            return None
-        return _Reading(mistake, read, self._gravity, explanation, gain - price)
+    def _single(self, now: GravityChoice) -> Iterator[_Reading]:
+        """The samples without one mistake, where both the file's own prediction and bodies clearly want it."""
+        clear = []
+        for mistake, read in self._promising():
+            gain, steadiness = gain_of(self._now, self._explain(read))
+            if gain > CLEAR and steadiness > STEADY:
+                clear.append((gain, mistake, read))
+        for _, mistake, read in sorted(clear, key=lambda one: -one[0])[:MOST_JUDGED]:
+            bodies = GravityFit(self._robot, read, self._gravity).file
+            likelier = bodies.cost < now.cost and bodies.strain <= USUAL_STRAIN < now.strain
+            if likelier or bodies.cost < now.cost - CLEAR_ABSENCE:
+                yield _Reading(mistake, read, self._gravity, bodies, bodies.cost)
 
-    def _turned(self, fit: GravityFit) -> tuple[_Reading, GravityChoice] | None:
-        """The samples in another gravity, if bodies near the file's and the file's own are clearly better there."""
-        choice = fit.found()
-        if choice is None:
-            return None
-        explanation = self._witness.explain(self._samples, choice.gravity)
+    def _turned(self, choice: GravityChoice) -> _Reading:
+        """The samples in another gravity; of one along no axis more is asked than of other readings."""
         file, gravity = self._robot.gravity, choice.gravity
         mistake = Mistake(
             kind=MistakeKind.GRAVITY_TURNED if gravity.any() else MistakeKind.GRAVITY_ABSENT,
@@ -170,47 +215,36 @@ class _Search:
             amount=angle_between(gravity, file) if gravity.any() and file.any() else 0.0,
             gravity=tuple(gravity.tolist()),
         )
-        gain, _ = gain_of(self._now, explanation)
-        convincing = share_explained(explanation, self._samples, list(range(self._robot.nv))) > CONVINCING
-        reading = _Reading(mistake, self._samples, gravity, explanation, gain)
-        clear = gain > (CLEAR if gravity.any() else 0.0)
-        return (reading, choice) if clear and convincing else None
+        price = CLEAR_ABSENCE if np.count_nonzero(gravity) > 1 else 0.0
+        return _Reading(mistake, self._samples, gravity, choice, choice.cost + price)
 
-    def _is_better(self, reading: _Reading, turned: GravityChoice) -> bool:
-        """Whether columns read otherwise leave bodies that clearly explain more than another gravity does."""
-        return GravityFit(self._robot, reading.samples).file.cost < turned.cost - CLEAR_ABSENCE
+    def _is_convincing(self, reading: _Reading) -> bool:
+        """Whether bodies explain the joints concerned, so read."""
+        joints = [self._places[name][1] for name in reading.mistake.joints]
+        return 1.0 - float(np.mean(reading.bodies.unexplained[joints])) > CONVINCING
 
-    def _may_be_permuted(self, fit: GravityChoice) -> bool:
-        """Whether some joint is not explained by bodies that are anywhere near the file's."""
-        near = fit.strain <= PLAUSIBLE and bool((fit.unexplained <= EXPLAINED).all())
-        return 1 < len(self._joints) <= MOST_ORDERED and not near
-
-    def _permuted(self) -> Iterator[_Reading]:
-        """Readings of other orders of the columns that are clearly better; of alike ones the bodies' choice first."""
-        search = OrderSearch(self._joints, self._samples, lambda few: self._witness.predict(few, self._gravity))
-        signs, _ = gain_of(self._now, self._explain(reordered(self._samples, self._joints, search.turned())))
+    def _permuted(self, now: GravityChoice) -> Iterator[_Reading]:
+        """Readings of other orders that bodies and the file's own prediction clearly prefer to signs in this one."""
+        judge = OrderJudge(
+            self._robot,
+            self._joints,
+            self._samples,
+            self._gravity,
+            lambda few: self._witness.predict(few, self._gravity),
+        )
+        as_logged = judge.as_logged()
+        limit = min(now.cost, judge.fit(as_logged).cost) - CLEAR_TURN
+        signs, _ = gain_of(self._now, self._explain(reordered(self._samples, self._joints, as_logged)))
         kinds = (MistakeKind.TORQUES_PERMUTED, MistakeKind.POSITIONS_PERMUTED, MistakeKind.JOINTS_PERMUTED)
-        for kind, assignments in zip(kinds, search.best(), strict=True):
-            readings = [one for assignment in assignments if (one := self._ordered(kind, assignment, max(signs, 0.0)))]
-            if len(readings) > 1:
-                readings.sort(key=lambda one: GravityFit(self._robot, one.samples).file.cost)
-            for reading in readings:
-                yield dataclasses.replace(reading, gain=min(reading.gain, readings[0].gain))
-
-    def _ordered(self, kind: MistakeKind, assignment: Assignment, signs: float) -> _Reading | None:
-        """The samples in another order, if that is clearly better and explains the joints concerned.
-
-        ``signs`` is what torques of other signs gain in the order as logged: no order has to be changed for that.
-        """
-        names, order = _changes(self._joints, assignment)
-        if assignment.is_as_logged:
-            return None
-        samples = reordered(self._samples, self._joints, assignment)
-        mistake = Mistake(kind=kind, joints=names, order=order)
-        reading = self._read_so(mistake, samples, signs + MOVED_COLUMNS * (len(names) - 2))
-        dofs = [self._places[name][1] for name in names]
-        convincing = reading is not None and share_explained(reading.explanation, samples, dofs) > CONVINCING
-        return reading if convincing else None
+        for kind, assignments in zip(kinds, judge.best(), strict=True):
+            for assignment in assignments:
+                names, order = _changes(self._joints, assignment)
+                samples, bodies = reordered(self._samples, self._joints, assignment), judge.fit(assignment)
+                gain, steadiness = gain_of(self._now, self._explain(samples))
+                price = max(signs, 0.0) + MOVED_COLUMNS * (len(names) - 2)
+                if bodies.cost < limit and gain > CLEAR + price and steadiness > STEADY:
+                    mistake = Mistake(kind=kind, joints=names, order=order)
+                    yield _Reading(mistake, samples, self._gravity, bodies, bodies.cost)
 
     def _conceivable(self) -> Iterator[Mistake]:
         for name in self._places:
@@ -243,6 +277,11 @@ class _Search:
             for values, columns in ((position, channels), (v, dofs), (a, dofs)):
                 values[:, columns] *= DEGREE
         return dataclasses.replace(now, position=position, v=v, a=a, tau=tau)
+
+
+def _is_near(bodies: GravityChoice, unexplained: float) -> bool:
+    """Whether bodies near the file's leave so little of every joint's torque that no order is doubted."""
+    return bodies.strain <= PLAUSIBLE and bool((bodies.unexplained <= unexplained).all())
 
 
 def _changes(joints: tuple[Joint, ...], assignment: Assignment) -> tuple[tuple[str, ...], tuple[Column, ...]]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from casysid.identification.mistakes import Mistake, MistakeKind
+from casysid.identification.mistakes import SCALES, Mistake
 from casysid.identification.result import IdentificationResult
 from casysid.identification.verdict.criteria import Criterion, Word
 from casysid.robot import Robot
@@ -56,7 +56,7 @@ def correction_criteria(result: IdentificationResult) -> Iterator[Criterion]:
         reason="These torques hold nothing inertial: usable for gravity and friction in slow motion.",
         origin="a computed torque is made of inertia",
     )
-    told = [one for one in result.mistakes if one.kind is not MistakeKind.SCALE or is_witness(result.robot)]
+    told = [one for one in result.mistakes if one.kind not in SCALES or is_witness(result.robot)]
     for mistake in told:
         yield _named(mistake)
     if not told:
@@ -65,7 +65,7 @@ def correction_criteria(result: IdentificationResult) -> Iterator[Criterion]:
 
 def _named(mistake: Mistake) -> Criterion:
     """A mistake of the log or the base that was found: a torque's sign is taken so, all else is still in the log."""
-    unit, corrected = mistake.kind is MistakeKind.SCALE, bool(mistake.negated_torques)
+    unit, corrected = mistake.kind in SCALES, bool(mistake.negated_torques)
     words = mistake.words.rstrip("?")
     remedy = f": try {mistake.option}" if mistake.option else ""
     if corrected:
