@@ -19,8 +19,9 @@ BUSY = 0.4
 """Torque is looked at of joints where some motion takes more than this share of the limit."""
 NEAR = 0.15
 """What comes nearer to its limit than this share of its scale is looked at often."""
-OFTEN = 2
-"""At every so many instants of the grid of the check; at all of them where a limit is violated."""
+OFTEN = 6
+"""At every so many instants of the grid of the check, a fortieth of the highest harmonic's period; at all of them where
+a limit is violated. Between two, a sinusoid of that frequency exceeds both by (2π/40)²/8, half of the tightening."""
 SELDOM = 20
 """At every so many of its instants everything is looked at."""
 
@@ -35,8 +36,11 @@ class Watched(NamedTuple):
 def on_grid(
     problem: ExcitationProblem, stride: int = 1, constraints: Sequence[Constraint] | None = None
 ) -> list[Watched]:
-    """Constraints, None for all, at every so many instants of the design grid; dense ones twice as often as it."""
-    time, dense = problem.series.grid(problem.samples)[::stride], problem.series.grid(2 * problem.samples)
+    """Constraints, None for all, at every so many instants of the design grid.
+
+    Dense ones are looked at four times as often, at most twice as often as the design grid has instants.
+    """
+    time, dense = (problem.series.grid(n * problem.samples)[::k] for n, k in ((1, stride), (2, max(1, stride // 2))))
     return [
         Watched(one, dense if one.dense else time)
         for one in (problem.constraints if constraints is None else constraints)
