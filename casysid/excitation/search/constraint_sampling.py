@@ -36,11 +36,8 @@ class Watched(NamedTuple):
 def on_grid(
     problem: ExcitationProblem, stride: int = 1, constraints: Sequence[Constraint] | None = None
 ) -> list[Watched]:
-    """Constraints, None for all, at every so many instants of the design grid.
-
-    Dense ones are looked at four times as often, at most twice as often as the design grid has instants.
-    """
-    time, dense = (problem.series.grid(n * problem.samples)[::k] for n, k in ((1, stride), (2, max(1, stride // 2))))
+    """Constraints, None for all, at every so many instants of the design grid; dense ones twice as often as it."""
+    time, dense = problem.series.grid(problem.samples)[::stride], problem.series.grid(2 * problem.samples)
     return [
         Watched(one, dense if one.dense else time)
         for one in (problem.constraints if constraints is None else constraints)
