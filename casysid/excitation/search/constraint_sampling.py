@@ -19,8 +19,9 @@ BUSY = 0.4
 """Torque is looked at of joints where some motion takes more than this share of the limit."""
 NEAR = 0.15
 """What comes nearer to its limit than this share of its scale is looked at often."""
-OFTEN = 2
-"""At every so many instants of the grid of the check; at all of them where a limit is violated."""
+OFTEN = 6
+"""At every so many instants of the grid of the check, a fortieth of the highest harmonic's period; at all of them where
+a limit is violated. Between two, a sinusoid of that frequency exceeds both by (2π/40)²/8, half of the tightening."""
 SELDOM = 20
 """At every so many of its instants everything is looked at."""
 

@@ -34,7 +34,7 @@ POLISHED = 2
 """So many of the motions found are polished: climbed from within limits that are looked at often."""
 ROUNDS = 2
 """How often, with more instants where a motion came near to limits."""
-POLISHING = 150
+POLISHING = 60
 """Steps at most each time."""
 BARRIER = 1e-3
 """IPOPT's first barrier parameter then."""
