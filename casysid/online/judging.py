@@ -26,10 +26,13 @@ class Judge:
         n = len(self._dofs)
         self._energies.append((missed[:n] + missed[n:], felt[:n] + felt[n:]))
 
-    def take_back(self, batches: int) -> None:
-        """The newest batches were of another robot than the model's."""
+    def take_back(self, batches: int) -> float:
+        """The newest batches were of another robot than the model's; share of all torque that was missed in them."""
+        missed = felt = 0.0
         for _ in range(min(batches, len(self._energies))):
-            self._energies.pop()
+            one = self._energies.pop()
+            missed, felt = missed + float(one[0].sum()), felt + float(one[1].sum())
+        return float(np.sqrt(missed / felt)) if felt > 0.0 else 0.0
 
     @property
     def missed(self) -> Array:

@@ -13,6 +13,7 @@ from casysid.dynamics import Coulomb, Regressor, Viscous, build_regressor
 from casysid.errors import ParameterError
 from casysid.identification import IdentificationResult
 from casysid.identification.passes import NEAR_REST, SAMPLES_PER_PERIOD, sum_moments
+from casysid.identification.verdict.explained import WHOLE
 from casysid.moments import Moments
 from casysid.online.drift import SHARE, FrictionWatch
 from casysid.online.events import Event
@@ -146,7 +147,7 @@ class Run:
     def _changed(self, change: Change, now: float) -> list[Event]:
         """What follows from a change, and what is said of it."""
         self._watch.forget()
-        self.judge.take_back(change.batches + 1)
+        missed = self.judge.take_back(change.batches + 1)
         count = min(change.batches + 1, len(self._waiting))
         newest = [self._waiting.pop() for _ in range(count)][::-1][-change.batches :]
         if change.name == PAYLOAD and (event := self._payload_changed(change, now)) is not None:
@@ -166,7 +167,7 @@ class Run:
             self._waiting.extend(newest)
             self._renew(now)
             return said
-        if now < self._quiet_until:  # what lasts is no contact
+        if now < self._quiet_until or missed < WHOLE:  # what lasts is no contact; what is small matters to nobody
             self._waiting.extend(newest)
             return []
         self._quiet_until = now + self._forget
