@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from casysid.kinematics import Kinematics as Kinematics
     from casysid.model import RobotModel as RobotModel
     from casysid.moments import Moments as Moments
+    from casysid.online import Online as Online
     from casysid.payload import identify_payload as identify_payload
     from casysid.reaching import InverseKinematics as InverseKinematics
     from casysid.reaching import LookAt as LookAt
@@ -66,6 +67,7 @@ _HOMES = {
     "Kinematics": "casysid.kinematics",
     "LookAt": "casysid.reaching",
     "Moments": "casysid.moments",
+    "Online": "casysid.online",
     "OrdinaryLeastSquares": "casysid.estimation",
     "Plant": "casysid.simulation",
     "PoseTarget": "casysid.reaching",

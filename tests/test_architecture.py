@@ -26,6 +26,7 @@ ORDER = (
     ("model",),
     ("identification",),
     ("payload",),
+    ("online",),
     ("validation",),
     ("report",),
     ("experiment",),
