@@ -30,6 +30,7 @@ class Choices:
         gains: Of the joints' torques relative to each other.
         smoothings: How often each recording was smoothed on the way.
         passes: How often the equations of each recording were evaluated on the way.
+        equations: Which are fitted, in words; empty where it is every joint's own.
     """
 
     band: BandChoice
@@ -41,6 +42,7 @@ class Choices:
     gains: DriveGains
     smoothings: int
     passes: int
+    equations: str = ""
 
     @property
     def settings(self) -> Settings:
@@ -62,4 +64,5 @@ class Choices:
             },
             "smoothings": self.smoothings,
             "passes": self.passes,
+            "equations": self.equations,
         }

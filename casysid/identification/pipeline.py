@@ -31,6 +31,13 @@ from casysid.identification.tuning.clock import choose_clock
 from casysid.identification.tuning.delay import choose_delay
 from casysid.identification.tuning.friction_selection import FrictionChoice, fit_model, select_friction
 from casysid.identification.tuning.ripples import ripple_uses
+from casysid.identification.unknown_forces import (
+    describe_equations,
+    has_unknown_forces,
+    is_free,
+    settings_for,
+    with_noise_of_known,
+)
 from casysid.moments import Moments
 from casysid.projection import (
     KeptLink,
@@ -146,8 +153,14 @@ def prepare(
         raise RecordingError("identify: at least one recording to fit is needed; got none")
     for several, fewest in ((fitted, FEWEST), (held_out, FEWEST_TO_PREDICT)):
         check_recordings(
-            several, cutoff=settings.cutoff, time_scale=settings.time_scale, delay=settings.delay, fewest=fewest
+            several,
+            cutoff=settings.cutoff,
+            time_scale=settings.time_scale,
+            delay=settings.delay,
+            fewest=fewest,
+            base_is_free=is_free(robot),
         )
+    settings = settings_for(robot, (*fitted, *held_out), settings)
     check_noise(fitted, settings.input_noise)
     check_sameness(fitted, held_out)
     clock = _Clock()
@@ -266,8 +279,9 @@ def _estimate(
     regressor: Regressor, moments: Moments, settings: Settings, problem: ProjectionProblem | None
 ) -> Estimate:
     if problem is None:
-        return settings.method.estimate(moments, regressor.prior)
-    return settings.method.estimate_among(moments, regressor.prior, PossibleParameters(problem, regressor.prior))
+        return with_noise_of_known(settings.method.estimate(moments, regressor.prior), moments)
+    possible = PossibleParameters(problem, regressor.prior)
+    return with_noise_of_known(settings.method.estimate_among(moments, regressor.prior, possible), moments)
 
 
 def _project(
@@ -312,7 +326,7 @@ def _choose(
         band = choose_band(whole, settings.cutoff)
         passes, candidates = _gather(robot, recordings, band, settings)
         work.append(passes)
-    mistakes = find_mistakes(robot, passes.sparse_motions, band.cutoff)
+    mistakes = () if has_unknown_forces(recordings) else find_mistakes(robot, passes.sparse_motions, band.cutoff)
     for mistake in mistakes:
         warnings.warn(mistake.sentence, CasysidWarning, stacklevel=4)
     progress("tuning", 0.5)
@@ -359,6 +373,7 @@ def _choose(
         gains=gains,
         smoothings=sum(one.smoothings for one in work),
         passes=sum(one.passes for one in work),
+        equations=describe_equations(robot, whole),
     )
     return _Chosen(choices, regressor, moments, passes, looked_at)
 
