@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from pathlib import Path
 
 from casysid.errors import RobotError
@@ -23,7 +24,8 @@ def find_model(name: str | Path) -> Path:
     """The model file that a user means: a path that exists, or a bundled model's name.
 
     Args:
-        name: A file's path, which wins; or ``"head"`` (its URDF), ``"head.urdf"``, ``"head.xml"``.
+        name: A file's path, which wins; or ``"head"`` (its URDF), ``"head.urdf"``, ``"head.xml"``; or the name of a
+            variant in a model's folder, ``"quadrotor_loaded"``.
 
     Raises:
         RobotError: There is no such file and no such model; the message lists the models.
@@ -40,6 +42,8 @@ def find_model(name: str | Path) -> Path:
             bundled = directory / stem / f"{stem}{suffix}"
             if bundled.is_file():
                 return bundled
+            if variant := next(directory.glob(f"*/{glob.escape(stem)}{suffix}"), None):
+                return variant
     known = ", ".join(bundled_models()) or "none installed"
     raise RobotError(
         f"robot '{name}': wanted a URDF or MJCF file, or a bundled model ({known}); there is no such file "

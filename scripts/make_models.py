@@ -51,6 +51,7 @@ class Solid:
     axis: str = "z"
     collision: bool = True
     why: str = ""
+    optional: bool = False
 
     def central_inertia(self) -> np.ndarray:
         """Inertia about its own centre in the link's axes, shape (3, 3), [kg m²]."""
@@ -76,6 +77,12 @@ class Link:
     parent: str
     joint: dict[str, Any]
     solids: tuple[Solid, ...]
+    frames: tuple[dict[str, Any], ...] = ()
+
+    @property
+    def floats(self) -> bool:
+        """Whether nothing holds it."""
+        return bool(self.joint["kind"] == "floating")
 
     def inertial(self) -> tuple[float, np.ndarray, np.ndarray]:
         """Mass, centre of mass, and inertia about it in the link's axes, to six digits as the files have them."""
@@ -101,16 +108,29 @@ class Machine:
     view: dict[str, list[float]]
     base: tuple[Solid, ...]
     links: tuple[Link, ...]
+    loaded: str = ""
+
+    @property
+    def moved(self) -> tuple[Link, ...]:
+        """Links with a motor."""
+        return tuple(link for link in self.links if not link.floats)
 
     @classmethod
-    def read(cls, path: Path) -> Machine:
-        """The machine of a table, named as the table's file."""
+    def read(cls, path: Path, *, loaded: bool = False) -> Machine:
+        """The machine of a table, named as the table's file; or with its optional solids, under the name for that."""
         table = tomllib.loads(path.read_text(encoding="utf-8"))
         links = tuple(
-            Link(row["name"], row["parent"], row["joint"], tuple(Solid(**s) for s in row["solids"]))
+            Link(
+                row["name"],
+                row["parent"],
+                row["joint"],
+                tuple(one for one in (Solid(**s) for s in row["solids"]) if loaded or not one.optional),
+                tuple(row.get("frames", ())),
+            )
             for row in table.pop("link")
         )
-        return cls(path.stem, base=tuple(Solid(**s) for s in table.pop("base")), links=links, **table)
+        base = tuple(Solid(**s) for s in table.pop("base", ()))
+        return cls(table["loaded"] if loaded else path.stem, base=base, links=links, **table)
 
 
 def urdf_shapes(solid: Solid) -> list[tuple[str, np.ndarray]]:
@@ -146,21 +166,42 @@ def urdf(machine: Machine) -> str:
         mass, center, inertia = link.inertial()
         names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
         tensor = " ".join(f'{n}="{numbers(x)}"' for n, x in zip(names, inertia[np.triu_indices(3)], strict=True))
-        joint, low, high = link.joint, *link.joint["range"]
         lines += [
             f'  <link name="{link.name}">',
             f'    <inertial><origin xyz="{numbers(center)}"/><mass value="{mass}"/><inertia {tensor}/></inertial>',
             *urdf_geometry(link.solids),
             "  </link>",
-            f'  <joint name="{joint["name"]}" type="{joint["kind"]}">',
-            f'    <parent link="{link.parent}"/><child link="{link.name}"/>',
-            f'    <origin xyz="{numbers(joint["at"])}" rpy="{numbers(joint.get("rpy", (0, 0, 0)))}"/>',
+            *urdf_joint(link),
+            *(line for frame in link.frames for line in urdf_frame(link, frame)),
+        ]
+    return "\n".join([*lines, "</robot>", ""])
+
+
+def urdf_joint(link: Link) -> list[str]:
+    joint = link.joint
+    lines = [
+        f'  <joint name="{joint["name"]}" type="{joint["kind"]}">',
+        f'    <parent link="{link.parent}"/><child link="{link.name}"/>',
+        f'    <origin xyz="{numbers(joint["at"])}" rpy="{numbers(joint.get("rpy", (0, 0, 0)))}"/>',
+    ]
+    if not link.floats:
+        low, high = joint["range"]
+        lines += [
             f'    <axis xyz="{numbers(AXES[joint["axis"]])}"/>',
             f'    <limit lower="{low}" upper="{high}" velocity="{joint["velocity"]}" effort="{joint["effort"]}"/>',
             f'    <dynamics damping="{joint["damping"]}" friction="{joint["friction"]}"/>',
-            "  </joint>",
         ]
-    return "\n".join([*lines, "</robot>", ""])
+    return [*lines, "  </joint>"]
+
+
+def urdf_frame(link: Link, frame: dict[str, Any]) -> list[str]:
+    return [
+        f'  <link name="{frame["name"]}"/>',
+        f'  <joint name="{frame["name"]}_fixed" type="fixed">',
+        f'    <parent link="{link.name}"/><child link="{frame["name"]}"/>',
+        f'    <origin xyz="{numbers(frame["at"])}" rpy="0.0 0.0 0.0"/>',
+        "  </joint>",
+    ]
 
 
 def quaternion(roll_pitch_yaw: Any) -> str:
@@ -186,14 +227,12 @@ def mjcf_body(machine: Machine, link: Link, depth: int) -> list[str]:
     mass, center, inertia = link.inertial()
     tensor = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     turn = f' quat="{quaternion(joint["rpy"])}"' if "rpy" in joint else ""
-    kind = {"revolute": "hinge", "prismatic": "slide"}[joint["kind"]]
     return [
         f'{indent}<body name="{link.name}" pos="{numbers(joint["at"])}"{turn}>',
         f'{indent}  <inertial pos="{numbers(center)}" mass="{mass}" fullinertia="{numbers(tensor)}"/>',
-        f'{indent}  <joint name="{joint["name"]}" type="{kind}" axis="{numbers(AXES[joint["axis"]])}" '
-        f'range="{numbers(joint["range"])}" damping="{joint["damping"]}" frictionloss="{joint["friction"]}" '
-        f'armature="{joint["armature"]}" actuatorfrcrange="{-joint["effort"]} {joint["effort"]}"/>',
+        f"{indent}  {mjcf_joint(link)}",
         *mjcf_geometry(link.solids, indent + "  "),
+        *(f'{indent}  <site name="{one["name"]}" pos="{numbers(one["at"])}" size="0.01"/>' for one in link.frames),
         *(
             line
             for child in machine.links
@@ -201,6 +240,34 @@ def mjcf_body(machine: Machine, link: Link, depth: int) -> list[str]:
             for line in mjcf_body(machine, child, depth + 1)
         ),
         f"{indent}</body>",
+    ]
+
+
+def mjcf_joint(link: Link) -> str:
+    joint = link.joint
+    if link.floats:
+        return f'<freejoint name="{joint["name"]}"/>'
+    kind = {"revolute": "hinge", "prismatic": "slide"}[joint["kind"]]
+    return (
+        f'<joint name="{joint["name"]}" type="{kind}" axis="{numbers(AXES[joint["axis"]])}" '
+        f'range="{numbers(joint["range"])}" damping="{joint["damping"]}" frictionloss="{joint["friction"]}" '
+        f'armature="{joint["armature"]}" actuatorfrcrange="{-joint["effort"]} {joint["effort"]}"/>'
+    )
+
+
+def mjcf_world(machine: Machine, roots: list[Link]) -> list[str]:
+    """All bodies; those that nothing holds have no base."""
+    if roots[0].floats:
+        return [*(line for link in roots for line in mjcf_body(machine, link, 2)), "  </worldbody>"]
+    return [
+        '    <body name="base">',
+        *mjcf_geometry(machine.base, "      "),
+        *(line for link in roots for line in mjcf_body(machine, link, 3)),
+        "    </body>",
+        "  </worldbody>",
+        "  <contact>",
+        *(f'    <exclude body1="base" body2="{link.name}"/>' for link in roots),
+        "  </contact>",
     ]
 
 
@@ -220,29 +287,35 @@ def mjcf(machine: Machine) -> str:
         "  <worldbody>",
         f'    <light type="directional" pos="0.0 0.0 4.0" dir="{numbers(target - eye - (0, 0, 1.5))}"/>',
     ]
-    lines += ['    <body name="base">', *mjcf_geometry(machine.base, "      ")]
-    lines += [line for link in roots for line in mjcf_body(machine, link, 3)]
-    lines += ["    </body>", "  </worldbody>", "  <contact>"]
-    lines += [f'    <exclude body1="base" body2="{link.name}"/>' for link in roots]
-    lines += ["  </contact>", "  <actuator>"]
-    for link in machine.links:
-        joint = link.joint
-        limits = f"{-joint['effort']} {joint['effort']}"
-        lines.append(f'    <motor name="{joint["name"]}_motor" joint="{joint["name"]}" ctrlrange="{limits}"/>')
-    return "\n".join([*lines, "  </actuator>", "</mujoco>", ""])
+    lines += mjcf_world(machine, roots)
+    if machine.moved:
+        lines += ["  <actuator>", *(mjcf_motor(link.joint) for link in machine.moved), "  </actuator>"]
+    return "\n".join([*lines, "</mujoco>", ""])
+
+
+def mjcf_motor(joint: dict[str, Any]) -> str:
+    limits = f"{-joint['effort']} {joint['effort']}"
+    return f'    <motor name="{joint["name"]}_motor" joint="{joint["name"]}" ctrlrange="{limits}"/>'
 
 
 def readme(machine: Machine) -> str:
-    files = f"`{machine.name}.urdf`, `{machine.name}.xml`"
+    names = [machine.name, *([machine.loaded] if machine.loaded else [])]
+    files = ", ".join(f"`{name}.urdf`, `{name}.xml`" for name in names)
     lines = [f"# {machine.title}", "", f"![{machine.title}]({machine.name}.png)", "", machine.text.strip(), ""]
     lines += [
         f"Files: {files} (the same machine; URDF has no word for armature). Control rate: {machine.rate:g} Hz.",
         "",
     ]
     lines += ["## Joints", "", machine.choice.strip(), ""]
-    lines += ["| joint | axis | at [m] in parent | range | velocity | effort | viscous | Coulomb | armature | why |"]
+    lines += readme_joints(machine) if machine.moved else []
+    lines += readme_frames(machine)
+    return "\n".join([*lines, *readme_links(machine), ""])
+
+
+def readme_joints(machine: Machine) -> list[str]:
+    lines = ["| joint | axis | at [m] in parent | range | velocity | effort | viscous | Coulomb | armature | why |"]
     lines += ["|---|---|---|---|---|---|---|---|---|---|"]
-    for link in machine.links:
+    for link in machine.moved:
         j = link.joint
         low, high = j["range"]
         lines.append(
@@ -250,8 +323,27 @@ def readme(machine: Machine) -> str:
             f"{j['velocity']:g} | {j['effort']:g} | {j['damping']:g} | {j['friction']:g} | {j['armature']:g} | "
             f"{j['why']} |"
         )
-    lines += ["", "Units: rad, rad/s, N m, N m s/rad, N m, kg m²; for a prismatic joint m, m/s, N, N s/m, N, kg.", ""]
-    lines += [
+    return [
+        *lines,
+        "",
+        "Units: rad, rad/s, N m, N m s/rad, N m, kg m²; for a prismatic joint m, m/s, N, N s/m, N, kg.",
+        "",
+    ]
+
+
+def readme_frames(machine: Machine) -> list[str]:
+    frames = [(link, frame) for link in machine.links for frame in link.frames]
+    if not frames:
+        return []
+    lines = ["## Frames", "", "| frame | on | at [m] | what |", "|---|---|---|---|"]
+    for link, frame in frames:
+        place = ", ".join(f"{x:g}" for x in frame["at"])
+        lines.append(f"| `{frame['name']}` | `{link.name}` | {place} | {frame['why']} |")
+    return [*lines, ""]
+
+
+def readme_links(machine: Machine) -> list[str]:
+    lines = [
         "## Links",
         "",
         "Each link is the sum of the solids it is drawn with, of uniform density, none of them centred.",
@@ -277,16 +369,18 @@ def readme(machine: Machine) -> str:
         row = lambda values: ", ".join(f"{1e3 * x:.4g}" for x in values)  # noqa: E731
         off = (inertia[0, 1], inertia[0, 2], inertia[1, 2])
         lines.append(f"| `{link.name}` | {mass:g} | {row(center)} | {row(np.diag(inertia))} | {row(off)} |")
-    return "\n".join([*lines, ""])
+    return lines
 
 
 def write_model(machine: Machine, directory: Path) -> None:
     directory.mkdir(parents=True, exist_ok=True)
-    for name, text in (
-        (f"{machine.name}.urdf", urdf(machine)),
-        (f"{machine.name}.xml", mjcf(machine)),
-        ("README.md", readme(machine)),
-    ):
+    machines = [machine]
+    if machine.loaded:
+        machines.append(Machine.read(TABLES / f"{machine.name}.toml", loaded=True))
+    files = {"README.md": readme(machine)}
+    for one in machines:
+        files |= {f"{one.name}.urdf": urdf(one), f"{one.name}.xml": mjcf(one)}
+    for name, text in files.items():
         (directory / name).write_text(text, encoding="utf-8")
 
 

@@ -12,7 +12,8 @@ from casysid.bundled import bundled_models, find_model
 from casysid.errors import RobotError
 from casysid.robot import Robot
 
-NAMES = ("arm", "head", "scara", "two_link")
+NAMES = ("arm", "head", "hopper", "quadrotor", "quadruped", "scara", "two_link")
+FLOATING = ("hopper", "quadrotor", "quadruped")
 ROOT = Path(__file__).parent.parent
 
 
@@ -38,7 +39,7 @@ def test_a_path_that_exists_wins_over_a_name(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("wrong", ["hat", "no/such/head", "head.json", ""])
 def test_an_unknown_name_lists_the_known_ones(wrong):
-    with pytest.raises(RobotError, match="arm, head, scara, two_link"):
+    with pytest.raises(RobotError, match="arm, head, hopper, quadrotor, quadruped, scara, two_link"):
         find_model(wrong)
 
 
@@ -49,11 +50,18 @@ def test_urdf_and_mjcf_have_the_same_inverse_dynamics(name):
     disable = mujoco.mjtDisableBit
     model.opt.disableflags |= disable.mjDSBL_CONTACT | disable.mjDSBL_LIMIT | disable.mjDSBL_FRICTIONLOSS
     data, reference_data, rng = mujoco.MjData(model), reference.createData(), np.random.default_rng(0)
+    at = slice(6 if name in FLOATING else 0, None)  # a base that rests: its coordinates are others in MuJoCo
     for _ in range(50):
-        data.qpos[:], data.qvel[:], data.qacc[:] = rng.normal(size=(3, model.nv)) * ((1.0,), (3.0,), (20.0,))
+        mujoco.mj_resetData(model, data)
+        values = rng.normal(size=(3, model.nv))[:, at] * ((1.0,), (3.0,), (20.0,))
+        data.qpos[model.nq - values.shape[1] :], data.qvel[at], data.qacc[at] = values
         mujoco.mj_inverse(model, data)
-        tau = pin.rnea(reference, reference_data, data.qpos.copy(), data.qvel.copy(), data.qacc.copy())
-        np.testing.assert_allclose(data.qfrc_inverse, tau + reference.damping * data.qvel, rtol=0, atol=1e-9)
+        q = data.qpos.copy()
+        if name in FLOATING:
+            q[3:7] = 0.0, 0.0, 0.0, 1.0  # MuJoCo's quaternions begin with w
+        tau = pin.rnea(reference, reference_data, q, data.qvel.copy(), data.qacc.copy())
+        wanted = tau + reference.damping * data.qvel
+        np.testing.assert_allclose(data.qfrc_inverse, wanted, rtol=0, atol=1e-9 * max(np.abs(wanted).max(), 1.0))
 
 
 def test_urdf_and_mjcf_load_as_the_same_robot(name):
@@ -62,7 +70,7 @@ def test_urdf_and_mjcf_load_as_the_same_robot(name):
     assert urdf.dofs == mjcf.dofs
     for field in ("inertial_parameters", "damping", "dry_friction", "position_lower", "position_upper", "effort_limit"):
         np.testing.assert_allclose(getattr(urdf, field), getattr(mjcf, field), rtol=1e-12, atol=1e-14)
-    assert (mjcf.armature > 0).all()
+    assert (mjcf.armature[6 if name in FLOATING else 0 :] > 0).all()
 
 
 def test_every_link_is_a_body_without_symmetry(name):
@@ -78,8 +86,9 @@ def test_every_limit_is_finite_and_zero_is_within(name):
     robot = Robot.from_file(find_model(name))
     assert (robot.position_lower <= 0).all()
     assert (robot.position_upper >= 0).all()
-    assert np.isfinite(np.concatenate([robot.position_lower, robot.position_upper])).all()
-    assert np.isfinite(np.concatenate([robot.velocity_limit, robot.effort_limit])).all()
+    places, ways = (7, 6) if name in FLOATING else (0, 0)  # what is free has no limits
+    assert np.isfinite(np.concatenate([robot.position_lower[places:], robot.position_upper[places:]])).all()
+    assert np.isfinite(np.concatenate([robot.velocity_limit[ways:], robot.effort_limit[ways:]])).all()
 
 
 def test_the_zero_pose_touches_nothing(name):
@@ -100,5 +109,21 @@ def test_the_arm_has_the_published_lengths():
 def test_the_files_are_what_the_tables_say(name, tmp_path):
     make = runpy.run_path(str(ROOT / "scripts" / "make_models.py"))
     make["write_model"](make["Machine"].read(make["TABLES"] / f"{name}.toml"), tmp_path)
+    assert {file.name for file in tmp_path.iterdir()} | {f"{name}.png"} == {
+        file.name for file in (ROOT / "models" / name).iterdir()
+    }
     for file in tmp_path.iterdir():
         assert file.read_text(encoding="utf-8") == (ROOT / "models" / name / file.name).read_text(encoding="utf-8")
+
+
+def test_the_payload_of_the_quadrotor_is_what_its_table_says():
+    empty, loaded = (Robot.from_file(find_model(name)) for name in ("quadrotor", "quadrotor_loaded"))
+    payload = (loaded.inertial_parameters - empty.inertial_parameters).ravel()
+    np.testing.assert_allclose(payload[:4], 0.25 * np.array([1.0, 0.02, -0.012, -0.08]), atol=2e-6)
+
+
+def test_the_gallery_shows_every_model():
+    gallery = (ROOT / "models" / "README.md").read_text(encoding="utf-8")
+    for name in NAMES:
+        assert f"]({name}/{name}.png)" in gallery
+        assert f"`casysid rehearse {name}`" in gallery

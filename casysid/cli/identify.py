@@ -197,6 +197,8 @@ def tell_result(console: Console, result: IdentificationResult, notes: tuple[str
     ):
         console.print(rich_table(title, table.header, table.rows))
         console.print()
+    if result.choices.equations:
+        say(console, result.choices.equations)
     say(console, f"torque delay: {result.delay.reason}")
     if noise := noise_table(result):
         console.print(rich_table("Noise of the measured motion", noise.header, noise.rows))

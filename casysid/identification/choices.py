@@ -31,6 +31,7 @@ class Choices:
         signs: -1 where a joint's torque was taken to be logged with the other sign, else 1, shape (nv,).
         smoothings: How often each recording was smoothed on the way.
         passes: How often the equations of each recording were evaluated on the way.
+        equations: Which are fitted, in words; empty where it is every joint's own.
     """
 
     band: BandChoice
@@ -43,6 +44,7 @@ class Choices:
     signs: Array
     smoothings: int
     passes: int
+    equations: str = ""
 
     @property
     def settings(self) -> Settings:
@@ -64,4 +66,5 @@ class Choices:
             },
             "smoothings": self.smoothings,
             "passes": self.passes,
+            "equations": self.equations,
         }

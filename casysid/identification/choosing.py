@@ -33,6 +33,7 @@ from casysid.identification.tuning.clock import choose_clock
 from casysid.identification.tuning.delay import choose_delay
 from casysid.identification.tuning.friction_selection import FrictionChoice, fit_model, select_friction
 from casysid.identification.tuning.ripples import ripple_uses
+from casysid.identification.unknown_forces import describe_equations, has_unknown_forces
 from casysid.moments import Moments
 from casysid.recording import Source
 from casysid.robot import Robot
@@ -70,7 +71,7 @@ def choose(
         band = choose_band(whole, settings.cutoff)
         passes, candidates = _gather(robot, recordings, band, settings)
         work.append(passes)
-    mistakes = find_mistakes(robot, passes.sparse_motions, band.cutoff)
+    mistakes = () if has_unknown_forces(recordings) else find_mistakes(robot, passes.sparse_motions, band.cutoff)
     for mistake in mistakes:
         warnings.warn(mistake.sentence, CasysidWarning, stacklevel=4)
     signs = np.ones(robot.nv) if settings.torque_gains else torque_signs(mistakes, robot.dofs)
@@ -121,6 +122,7 @@ def choose(
         signs=signs,
         smoothings=sum(one.smoothings for one in work),
         passes=sum(one.passes for one in work),
+        equations=describe_equations(robot, whole),
     )
     return Chosen(choices, regressor, moments, passes, looked_at)
 

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from casysid.accumulation import accumulate_moments
 from casysid.arrays import Array
 from casysid.dynamics import Regressor, continued_positions
 from casysid.identification.prediction import ErrorSums, TorqueError, error_sums, torque_errors
 from casysid.identification.tuning.band import BandChoice
+from casysid.identification.unknown_forces import moments_of_known
 from casysid.moments import Moments
 from casysid.recording import Source
 from casysid.robot import Robot
@@ -326,13 +326,10 @@ def sum_moments(
         only_rows: Whether joints near rest that have no row are left out.
     """
     parts = [
-        accumulate_moments(
+        moments_of_known(
             regressor,
-            motion.q,
-            motion.v,
-            motion.a,
-            motion.tau,
-            average=None if cutoff is None else BandAverage(motion.time, cutoff),
+            motion,
+            None if cutoff is None else BandAverage(motion.time, cutoff),
             near_rest=mask,
             blocks=blocks,
             threads=threads,

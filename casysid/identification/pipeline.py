@@ -22,6 +22,7 @@ from casysid.identification.passes import Mapped, Passes, excerpts, is_long
 from casysid.identification.result import IdentificationResult
 from casysid.identification.sameness import check_sameness
 from casysid.identification.settings import Settings
+from casysid.identification.unknown_forces import is_free, settings_for, with_noise_of_known
 from casysid.moments import Moments
 from casysid.projection import (
     KeptLink,
@@ -136,8 +137,14 @@ def prepare(
         raise RecordingError("identify: at least one recording to fit is needed; got none")
     for several, fewest in ((fitted, FEWEST), (held_out, FEWEST_TO_PREDICT)):
         check_recordings(
-            several, cutoff=settings.cutoff, time_scale=settings.time_scale, delay=settings.delay, fewest=fewest
+            several,
+            cutoff=settings.cutoff,
+            time_scale=settings.time_scale,
+            delay=settings.delay,
+            fewest=fewest,
+            base_is_free=is_free(robot),
         )
+    settings = settings_for(robot, (*fitted, *held_out), settings)
     check_noise(fitted, settings.input_noise)
     check_sameness(fitted, held_out)
     fitted, held_out = evened(fitted), evened(held_out)
@@ -257,8 +264,9 @@ def _estimate(
     regressor: Regressor, moments: Moments, settings: Settings, problem: ProjectionProblem | None
 ) -> Estimate:
     if problem is None:
-        return settings.method.estimate(moments, regressor.prior)
-    return settings.method.estimate_among(moments, regressor.prior, PossibleParameters(problem, regressor.prior))
+        return with_noise_of_known(settings.method.estimate(moments, regressor.prior), moments)
+    possible = PossibleParameters(problem, regressor.prior)
+    return with_noise_of_known(settings.method.estimate_among(moments, regressor.prior, possible), moments)
 
 
 def _project(

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from casysid.arrays import Array, frozen
 from casysid.dynamics import Regressor
 from casysid.identification.order import as_given
+from casysid.identification.unknown_forces import known_part
 from casysid.signals import BandAverage, Motion
 from casysid.threads import single_threaded
 
@@ -89,9 +90,11 @@ def error_sums(
     for place, motion in enumerate(motions):
         inner = motion.settled if motion.settled.any() else np.ones(len(motion), dtype=bool)
         weights, remembered = averages_of(motion, cutoff), regressor.histories(motion.q, motion.time)
+        known = replace(motion, tau=known_part(regressor.robot, motion, motion.tau))
         for table, theta in zip(tables, parameters, strict=True):
             predicted = regressor.predict(theta, motion.q, motion.v, motion.a, histories=remembered)
-            table.add(motion, predicted, inner, weights, curves=curves is None or place < curves)
+            predicted = known_part(regressor.robot, motion, predicted)
+            table.add(known, predicted, inner, weights, curves=curves is None or place < curves)
     return tables
 
 

@@ -63,6 +63,8 @@ class Layout:
         factors: By which columns are multiplied to be in SI units at the joint; the others by one.
         remarks: What to say of the choice.
         unmeasured: Columns of torque that hold nothing; zeros stand for them.
+        contacts: Frames that touch with wrenches that nobody measured, each with its column of flags.
+        wrenches: Frames whose measured wrenches are in the torques.
     """
 
     clock: Clock | None
@@ -73,6 +75,8 @@ class Layout:
     factors: Mapping[str, float] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
     unmeasured: tuple[str, ...] = ()
+    contacts: tuple[tuple[str, str], ...] = ()
+    wrenches: tuple[str, ...] = ()
 
     @property
     def time(self) -> str | None:
@@ -84,7 +88,8 @@ class Layout:
         """All columns, each once."""
         clock = () if self.clock is None else self.clock.columns
         motion = (*self.position, *(self.velocity or ()), *(self.acceleration or ()))
-        return tuple(dict.fromkeys((*clock, *motion, *self.torque)))
+        flags = (column for _, column in self.contacts)
+        return tuple(dict.fromkeys((*clock, *motion, *self.torque, *flags)))
 
 
 @dataclass(frozen=True)

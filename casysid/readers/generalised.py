@@ -1,4 +1,4 @@
-"""Logs of robots whose base is free: wrenches at frames, and a base that no motor drives.
+"""Logs of robots whose base is free: wrenches at frames, contacts, and a base that no motor drives.
 
 The equations of such a robot are ``Y θ = Sᵀ τ + Σ J_fᵀ w_f``: the joints' torques, and the wrenches that the world
 applies at frames. The right side is what is measured, so it is put in the place of the torques, sample by sample, and
@@ -11,15 +11,16 @@ all that follows is as for any other robot. Columns beside those of every log:
 ``contact_<frame>``                        1 while the frame touches the world, 0 else
 ========================================= =============================================================
 
-Components that are not there are zero. Torques of the free base need no columns: they are zero.
+Components that are not there are zero. Torques of the free base need no columns: they are zero. Where no joint has a
+torque the rows of the base are left, and where a frame touches without a wrench the rows that its force does not enter
+(:mod:`casysid.floating`).
 """
 
 from __future__ import annotations
 
-import difflib
-import re
+import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -27,33 +28,16 @@ import numpy as np
 
 from casysid.arrays import Array
 from casysid.errors import RecordingError
-from casysid.readers.candidates import POSITION, TORQUE, Labels
+from casysid.readers.candidates import POSITION, TORQUE, Labels, read_names, usual_by_number
+from casysid.readers.columns import Layout
 from casysid.readers.messages import listing
 from casysid.readers.table import Table
+from casysid.readers.wrench_columns import WrenchColumns, find_contacts, find_wrenches
 from casysid.robot import JointKind, Robot
 from casysid.robot.coordinates import configuration_from_channels
 
 if TYPE_CHECKING:
     from casysid.kinematics import Kinematics
-
-COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
-_WRENCH = re.compile(rf"(world_)?({'|'.join(COMPONENTS)})_(.+)")
-_CONTACT = re.compile(r"contact_(.+)")
-
-
-@dataclass(frozen=True)
-class WrenchColumns:
-    """Columns of one wrench.
-
-    Attributes:
-        frame: Where it acts.
-        in_world: Whether its components are along the world's axes.
-        columns: By component; None where it is not there.
-    """
-
-    frame: str
-    in_world: bool
-    columns: tuple[str | None, ...]
 
 
 def base_dofs(robot: Robot) -> slice | None:
@@ -66,69 +50,18 @@ def with_generalised_forces(table: Table, robot: Robot, source: str) -> Table:
     """The table with generalised forces as torques, for a robot with a free base; else the very table.
 
     Raises:
-        RecordingError: A wrench or a contact names a frame that the robot has not, or a frame touches the world while
-            no wrench of it is there.
+        RecordingError: A wrench or a contact names a frame that the robot has not, or nothing says what moves it.
     """
     base = base_dofs(robot)
     if base is None:
         return table
     wrenches, contacts = find_wrenches(table.names, robot, source), find_contacts(table.names, robot, source)
-    silent = [column for frame, column in contacts.items() if frame not in {wrench.frame for wrench in wrenches}]
-    if silent:
-        raise RecordingError(
-            f"{source}: {listing(silent)}: contacts without a wrench; torques cannot be told from contact forces that "
-            "nobody measured. Log the wrench (fx_<frame> ... mz_<frame>), leave out stretches in contact, or take "
-            "moments of what the contacts leave free (casysid.floating.projected_moments)"
-        )
-    return GeneralisedTable(table, robot, wrenches, source)
-
-
-def find_wrenches(names: Sequence[str], robot: Robot, source: str) -> tuple[WrenchColumns, ...]:
-    """Wrenches among the columns of a log.
-
-    Raises:
-        RecordingError: One names a frame that the robot has not, or is given along both axes.
-    """
-    found: dict[tuple[str, bool], dict[str, str]] = {}
-    for name in names:
-        if match := _WRENCH.fullmatch(name):
-            _require_frame(robot, match[3], name, source)
-            found.setdefault((match[3], match[1] is not None), {})[match[2]] = name
-    both = sorted(frame for frame, in_world in found if in_world and (frame, False) in found)
-    if both:
-        raise RecordingError(
-            f"{source}: the wrench of frame '{both[0]}' is given along the world's axes and along its own; keep one"
-        )
-    return tuple(
-        WrenchColumns(frame, in_world, tuple(columns.get(component) for component in COMPONENTS))
-        for (frame, in_world), columns in found.items()
-    )
-
-
-def find_contacts(names: Sequence[str], robot: Robot, source: str) -> dict[str, str]:
-    """Columns of contact flags by frame.
-
-    Raises:
-        RecordingError: One names a frame that the robot has not.
-    """
-    found = {}
-    for name in names:
-        if match := _CONTACT.fullmatch(name):
-            _require_frame(robot, match[1], name, source)
-            found[match[1]] = name
-    return found
-
-
-def _require_frame(robot: Robot, frame: str, column: str, source: str) -> None:
-    from casysid.kinematics import frames_of
-
-    names = [one.name for one in frames_of(robot)]
-    if frame not in names:
-        near = difflib.get_close_matches(frame, names, n=3)
-        hint = f"; did you mean {listing(near)}?" if near else ""
-        raise RecordingError(
-            f"{source}: column '{column}': robot '{robot.name}' has no frame '{frame}'{hint} Frames: {listing(names)}"
-        )
+    measured = {wrench.frame for wrench in wrenches}
+    unknown = tuple((frame, column) for frame, column in contacts.items() if frame not in measured)
+    table = GeneralisedTable(table, robot, wrenches, unknown, tuple(contacts.values()), source)
+    if table.silent:
+        table.require_forces()
+    return table
 
 
 @dataclass(frozen=True)
@@ -139,17 +72,27 @@ class GeneralisedTable:
         table: The log.
         robot: Whose base is free.
         wrenches: In the log.
+        contacts: Frames that touch with unknown wrenches, each with its column.
+        flags: All columns of contact flags.
         source: For messages.
+        placed: Columns of the channels' positions, once they are known.
+        timed: Whether the samples follow each other in time.
+        turned: Number of samples whose base quaternion was turned to the sign of the one before, in the last reading.
     """
 
     table: Table
     robot: Robot
     wrenches: tuple[WrenchColumns, ...]
+    contacts: tuple[tuple[str, str], ...]
+    flags: tuple[str, ...]
     source: str
+    placed: tuple[str, ...] = ()
+    timed: bool = False
+    turned: list[int] = field(default_factory=lambda: [0], compare=False)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The log's columns, and those of the base's torques where it has none."""
+        """The log's columns, and those of torques where it has none."""
         return (*self.table.names, *self._added)
 
     @property
@@ -171,26 +114,84 @@ class GeneralisedTable:
         """As in the log."""
         return self.table.place(row)
 
-    def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
-        """Columns as float64, torques with what the wrenches do to them.
+    def completed(self, layout: Layout) -> tuple[GeneralisedTable, Layout]:
+        """The layout with contacts, wrenches and torques that nobody measured, and the table that fits it."""
+        layout = dataclasses.replace(
+            layout,
+            contacts=self.contacts,
+            wrenches=tuple(wrench.frame for wrench in self.wrenches),
+            unmeasured=(*layout.unmeasured, *self._silent_columns),
+        )
+        return dataclasses.replace(self, placed=layout.position, timed=layout.clock is not None), layout
+
+    @cached_property
+    def silent(self) -> bool:
+        """Whether the log has no torque of any joint, under any name."""
+        joints = [f"{word}_{dof}" for word in TORQUE.named for dof in self.robot.dofs]
+        if set(joints) & set(self.table.names) or len(self.robot.dofs) == len(self._base):
+            return False
+        names = self.table.names, self.robot.channels, self.robot.dofs
+        read = [*read_names(*names, self.table.labels), *usual_by_number(TORQUE, names[0], len(names[2]), self.source)]
+        return not any(one.quantity in ("torque", "current") and one.columns for one in read)
+
+    def require_forces(self) -> None:
+        """Nothing, if wrenches say what moves a robot without torques.
 
         Raises:
-            RecordingError: A wrench is not finite.
+            RecordingError: They do not.
+        """
+        joints = [dof for dof in self.robot.dofs if dof not in self._base]
+        if self.contacts:
+            frames = listing([frame for frame, _ in self.contacts])
+            raise RecordingError(
+                f"{self.source}: no torque of {listing(joints)}, and contacts without a wrench ({frames}): no equation "
+                "is left in which all forces are known. Log the joints' torques (tau_<joint>) or the wrenches "
+                "(fx_<frame> ... mz_<frame>)"
+            )
+        if not self.wrenches:
+            raise RecordingError(
+                f"{self.source}: neither torques (tau_<joint>: {listing(joints)}) nor wrenches (fx_<frame> ... "
+                "mz_<frame>); one of them must be there, as motion alone tells no mass. Found: "
+                f"{listing(self.table.names)}"
+            )
+
+    def batches(self, names: Sequence[str], first: int = 0) -> Iterator[dict[str, Array]]:
+        """Columns as float64, torques with what the wrenches do to them, quaternions without jumps of their sign.
+
+        Raises:
+            RecordingError: A wrench is not finite, or a flag neither 0 nor 1.
         """
         torque = [f"{self._spelling}_{dof}" for dof in self.robot.dofs]
         summed = [name for name in names if name in torque] if self.wrenches else []
-        more = [*self._positions, *self._components] if summed else []
+        more = [*self._positions, *self._components, *self.flags] if summed else []
         asked = dict.fromkeys([*(name for name in names if name not in self._added), *more])
-        row = first
+        row, last = first, np.empty(0)
+        self.turned[0] = 0
         for batch in self.table.batches(list(asked) or list(self.table.names[:1]), first):
             rows = len(next(iter(batch.values())))
             columns = batch | {name: np.zeros(rows) for name in self._added}
+            self._check_flags({name: batch[name] for name in self.flags if name in batch}, row)
             if summed:
                 force = self._force(batch, row)
                 for name in summed:
                     columns[name] = columns[name] + force[:, torque.index(name)]
+            if self._quaternion and set(self._quaternion) <= set(columns):
+                logged = np.column_stack([columns[name] for name in self._quaternion])
+                continued = continued_signs(logged, last)
+                self.turned[0] += int(np.count_nonzero(np.sum(logged * continued, axis=1) < 0.0))
+                last = continued[-1] if len(continued) else last
+                columns |= dict(zip(self._quaternion, continued.T, strict=True))
             yield {name: columns[name] for name in names}
             row += rows
+
+    def _check_flags(self, flags: Mapping[str, Array], row: int) -> None:
+        for name, values in flags.items():
+            bad = np.flatnonzero((values != 0.0) & (values != 1.0))
+            if len(bad):
+                raise RecordingError(
+                    f"{self.source}: column '{name}' must be 1 while the frame touches the world and 0 else; got "
+                    f"{values[bad[0]]:g} at {self.table.place(row + int(bad[0]))}"
+                )
 
     def _force(self, batch: Mapping[str, Array], row: int) -> Array:
         """Generalised forces of the wrenches, shape (rows, nv); zero where there is no configuration."""
@@ -222,6 +223,11 @@ class GeneralisedTable:
         return Kinematics(self.robot)
 
     @cached_property
+    def _base(self) -> tuple[str, ...]:
+        base = base_dofs(self.robot)
+        return () if base is None else tuple(self.robot.dofs[base])
+
+    @cached_property
     def _spelling(self) -> str:
         """How the log spells torques."""
         there = set(self.table.names)
@@ -230,6 +236,8 @@ class GeneralisedTable:
     @cached_property
     def _positions(self) -> tuple[str, ...]:
         """Columns of the channels' positions; empty where the log has numbers instead of names."""
+        if self.placed:
+            return self.placed
         there = set(self.table.names)
         for word in POSITION.named:
             names = tuple(f"{word}_{channel}" for channel in self.robot.channels)
@@ -241,17 +249,44 @@ class GeneralisedTable:
         )
 
     @cached_property
+    def _quaternion(self) -> tuple[str, ...]:
+        """Columns of the base's, whose signs may be mended; none before positions are known, or without time."""
+        return self.placed[self.robot.joints[0].channels][-4:] if self.timed else ()
+
+    @cached_property
     def _components(self) -> tuple[str, ...]:
         return tuple(name for wrench in self.wrenches for name in wrench.columns if name is not None)
 
     @cached_property
+    def _silent_columns(self) -> tuple[str, ...]:
+        """Of torques that nobody measured."""
+        return tuple(name for name in self._added if name.removeprefix(f"{self._spelling}_") not in self._base)
+
+    @cached_property
     def _added(self) -> tuple[str, ...]:
-        """Torques of the base, if the log has those of joints by name and none of the base."""
-        base, there = base_dofs(self.robot), set(self.table.names)
-        own = tuple(f"{self._spelling}_{dof}" for dof in self.robot.dofs[base]) if base is not None else ()
+        """Torques of the base, if the log has those of joints by name and none of the base; all, if it has none."""
+        there = set(self.table.names)
+        own = tuple(f"{self._spelling}_{dof}" for dof in self._base)
         joints = [f"{self._spelling}_{dof}" for dof in self.robot.dofs if f"{self._spelling}_{dof}" not in own]
+        if self.silent:
+            return (*own, *joints)
         is_named = there.issuperset(joints) if joints else f"{POSITION.named[0]}_{self.robot.channels[0]}" in there
         return own if is_named and not there.intersection(own) else ()
+
+
+def continued_signs(quaternions: Array, last: Array) -> Array:
+    """The same orientations, each quaternion on the side of the one before it, ``q`` and ``-q`` being one.
+
+    Args:
+        quaternions: Shape (N, 4).
+        last: The one before the first, shape (4,), or empty.
+    """
+    if not len(quaternions):
+        return quaternions
+    before = quaternions[:1] if not len(last) else last[None]
+    away = np.sum(quaternions * np.concatenate([before, quaternions[:-1]]), axis=1) < 0.0
+    # the first is held against one whose sign is settled, all others against a logged one
+    return np.asarray(quaternions * np.where(np.cumsum(away) % 2 == 1, -1.0, 1.0)[:, None])
 
 
 def _has_configuration(robot: Robot, position: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

@@ -8,20 +8,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from casysid.arrays import Array
 from casysid.errors import RecordingError
 from casysid.readers.angles import unwrap
+from casysid.readers.base_motion import BaseMotion
 from casysid.readers.checks import SampleChecks, check_quaternions, check_steps
 from casysid.readers.columns import Layout
 from casysid.readers.faults import decided_unit, emptied, glitches_of, too_fast
-from casysid.readers.generalised import with_generalised_forces
+from casysid.readers.generalised import GeneralisedTable, with_generalised_forces
 from casysid.readers.mapping import lay_out, text_of_map
 from casysid.readers.repairs import Columns, together
 from casysid.readers.samples import Samples
 from casysid.readers.statistics import Statistics
 from casysid.readers.survey import Survey
-from casysid.readers.table import open_table
+from casysid.readers.table import Table, open_table
 from casysid.readers.units import check_units
 from casysid.readers.weaknesses import find_weaknesses
 from casysid.recording.declared import NOTHING, Declared
@@ -80,6 +82,8 @@ def scan_recording(path: Path, robot: Robot, declared: Declared = NOTHING) -> tu
         unused_columns=found.unused,
         column_map=text_of_map(found.samples.layout, robot.channels, robot.dofs, declared, _lengths(robot)),
         unmeasured=_unmeasured(found.samples.layout, robot.dofs),
+        contacts=tuple(frame for frame, _ in found.samples.layout.contacts),
+        wrenches=found.samples.layout.wrenches,
     )
     return recording, found.sentences(robot)
 
@@ -181,11 +185,14 @@ def _scan(path: Path, robot: Robot, declared: Declared, parts: list[Columns] | N
     layout = lay_out(
         table.names, robot.channels, robot.dofs, source, table.labels, declared, _lengths(robot), robot.numbered
     )
+    if isinstance(table, GeneralisedTable):
+        table, layout = table.completed(layout)
     samples = Samples(table, layout).with_clock_started()
     samples.check_curves(source)
     remarks = list(layout.remarks)
     for _ in range(MOST_ROUNDS):
         checks = SampleChecks(table.place, samples.layout, source)
+        base = BaseMotion(robot, source)
         statistics, survey = Statistics(robot, source), Survey(samples.layout, glitches_of(robot, samples.layout))
         if parts is not None:
             parts.clear()
@@ -193,16 +200,19 @@ def _scan(path: Path, robot: Robot, declared: Declared, parts: list[Columns] | N
             survey.add(columns)
             checks.add(columns)
             if not checks.faulty:
-                statistics.add(_recording(columns, samples.layout, robot, {}))
+                rows = _recording(columns, samples.layout, robot, {})
+                statistics.add(rows)
+                base.add(rows)
             if parts is not None:
                 parts.append(columns)
-        found = _better(samples, survey, statistics, robot)
+        found = _better(samples, survey, statistics, robot) or _own_twist(samples, base)
         if found is None:
             break
         samples, remark = found
         remarks.append(remark)
     checks.finish()
     check_quaternions(statistics, robot)
+    remarks += [said for said in (_signs(table), base.check_order()) if said]
     check_units(statistics, robot)
     if samples.layout.clock is not None and samples.layout.clock.units != layout.clock.units:  # type: ignore[union-attr]
         too_fast(statistics, robot, samples.layout.clock.units[0])
@@ -213,6 +223,23 @@ def _scan(path: Path, robot: Robot, declared: Declared, parts: list[Columns] | N
 def _better(samples: Samples, survey: Survey, statistics: Statistics, robot: Robot) -> tuple[Samples, str] | None:
     """The log with one more repair, and what to say of it; None when there is none to make."""
     return emptied(samples, survey, robot) or _repaired(samples, survey) or decided_unit(samples, survey, statistics)
+
+
+def _own_twist(samples: Samples, base: BaseMotion) -> tuple[Samples, str] | None:
+    """The log without a twist of the base that is along other axes than its own."""
+    parts = base.twist_in_world() if samples.layout.velocity is not None else ()
+    if not parts:
+        return None
+    return samples.laid_out(velocity=None, acceleration=None), (
+        f"the base's {' and '.join(parts)} velocity is along the world's axes, not the body's; velocity and "
+        "acceleration are left aside, as positions tell them"
+    )
+
+
+def _signs(table: Table) -> str:
+    """What was done to the base's quaternions."""
+    turned = table.turned[0] if isinstance(table, GeneralisedTable) else 0
+    return f"the base's quaternion changes its sign between samples; {turned} were turned back" if turned else ""
 
 
 def _repaired(samples: Samples, survey: Survey) -> tuple[Samples, str] | None:
@@ -239,12 +266,19 @@ def _recording(
         acceleration=None if layout.acceleration is None else _stacked(layout.acceleration, columns),
         torque=_stacked(layout.torque, columns),
         unmeasured=_unmeasured(layout, names.dofs),
+        contacts=tuple(frame for frame, _ in layout.contacts),
+        touching=_touching(layout, columns),
+        wrenches=layout.wrenches,
         **about,
     )
 
 
 def _unmeasured(layout: Layout, dofs: Sequence[str]) -> tuple[str, ...]:
     return tuple(dof for dof, column in zip(dofs, layout.torque, strict=True) if column in layout.unmeasured)
+
+
+def _touching(layout: Layout, columns: Mapping[str, Array]) -> npt.NDArray[np.bool_] | None:
+    return _stacked([column for _, column in layout.contacts], columns) > 0.5 if layout.contacts else None
 
 
 def _stacked(names: Sequence[str], columns: Mapping[str, Array]) -> Array:

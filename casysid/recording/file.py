@@ -103,6 +103,8 @@ class RecordingFile(Source):
         unused_columns: Its columns that were left aside.
         column_map: Which columns it is read from, as text for :func:`~casysid.recording.read_map`.
         unmeasured: Degrees of freedom without a torque; zeros stand for it.
+        contacts: Frames that touch the world with wrenches that nobody measured.
+        wrenches: Frames whose measured wrenches are in the torques.
     """
 
     channels: tuple[str, ...]
@@ -122,6 +124,8 @@ class RecordingFile(Source):
     unused_columns: tuple[str, ...] = field(default=(), repr=False)
     column_map: str = field(default="", repr=False)
     unmeasured: tuple[str, ...] = ()
+    contacts: tuple[str, ...] = ()
+    wrenches: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return self.last - self.first
@@ -231,6 +235,9 @@ class RecordingFile(Source):
             sources=self.sources,
             unused_columns=self.unused_columns,
             unmeasured=self.unmeasured,
+            contacts=self.contacts,
+            touching=batch.touching,
+            wrenches=self.wrenches,
             **changed,
         )
 

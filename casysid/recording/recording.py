@@ -46,6 +46,9 @@ class Recording(Source):
         sources: Files it came from.
         unused_columns: Columns of those files that were left aside.
         unmeasured: Degrees of freedom without a torque; zeros stand for it.
+        contacts: Frames that touch the world with wrenches that nobody measured.
+        touching: When each of them does, boolean, shape (N, contacts); None where there are none.
+        wrenches: Frames whose measured wrenches are in ``torque``.
 
     Raises:
         RecordingError: On wrong shapes, values that are not finite, time that does not increase, or unordered samples
@@ -63,6 +66,9 @@ class Recording(Source):
     sources: tuple[str, ...] = ()
     unused_columns: tuple[str, ...] = field(default=(), repr=False)
     unmeasured: tuple[str, ...] = ()
+    contacts: tuple[str, ...] = ()
+    touching: npt.NDArray[np.bool_] | None = field(default=None, repr=False)
+    wrenches: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         samples = next(iter(np.shape(self.position)), 0)
@@ -72,6 +78,7 @@ class Recording(Source):
             values = getattr(self, name)
             if values is not None:
                 object.__setattr__(self, name, self._checked(name, frozen(values), (samples, *width)))
+        self._check_touching(samples)
         if self.time is None and (self.velocity is None or self.acceleration is None):
             raise RecordingError(
                 f"{self.label}: without time the samples are unordered and nothing can be differentiated; "
@@ -81,6 +88,18 @@ class Recording(Source):
             raise RecordingError(
                 f"{self.label}: time must increase from each sample to the next; sort the samples by time"
             )
+
+    def _check_touching(self, samples: int) -> None:
+        if self.touching is None and not self.contacts:
+            return
+        touching = np.array(self.touching)
+        if touching.dtype != np.bool_ or touching.shape != (samples, len(self.contacts)):
+            raise RecordingError(
+                f"{self.label}: touching must be boolean with shape ({samples}, {len(self.contacts)}), one for each "
+                f"contact; got {touching.dtype} with shape {touching.shape}"
+            )
+        touching.setflags(write=False)
+        object.__setattr__(self, "touching", touching)
 
     def _checked(self, name: str, values: Array, shape: tuple[int, ...]) -> Array:
         if values.shape != shape:
@@ -187,6 +206,7 @@ class Recording(Source):
             time=None if self.time is None else self.time[rows],
             velocity=None if self.velocity is None else self.velocity[rows],
             acceleration=None if self.acceleration is None else self.acceleration[rows],
+            touching=None if self.touching is None else self.touching[rows],
         )
 
     def with_position(self, position: Array) -> Recording:
@@ -277,6 +297,9 @@ class Recording(Source):
         ):
             if values is not None:
                 columns |= {f"{letter}_{name}": column for name, column in zip(names, values.T, strict=True)}
+        if self.touching is not None:
+            flags = self.touching.T.astype(np.float64)
+            columns |= {f"contact_{name}": column for name, column in zip(self.contacts, flags, strict=True)}
         return columns
 
     def write(self, path: str | Path) -> Path:
@@ -298,10 +321,10 @@ def joined(parts: Sequence[Recording]) -> Recording:
     if len(parts) == 1:
         return parts[0]
 
-    def together(name: str) -> Array | None:
+    def together(name: str) -> npt.NDArray[Any] | None:
         values = [getattr(part, name) for part in parts]
         return None if values[0] is None else np.concatenate(values)
 
-    names = ("time", "position", "velocity", "acceleration", "torque")
+    names = ("time", "position", "velocity", "acceleration", "torque", "touching")
     fields = {one.name: getattr(parts[0], one.name) for one in dataclasses.fields(Recording)}
     return Recording.unchecked(**(fields | {name: together(name) for name in names}))

@@ -43,6 +43,8 @@ class Source(ABC):
         sources: Files it came from.
         unused_columns: Columns of those files that were left aside.
         unmeasured: Degrees of freedom without a torque; zeros stand for it.
+        contacts: Frames that touch the world with wrenches that nobody measured.
+        wrenches: Frames whose measured wrenches are in the torques.
     """
 
     channels: tuple[str, ...]
@@ -51,6 +53,8 @@ class Source(ABC):
     sources: tuple[str, ...]
     unused_columns: tuple[str, ...]
     unmeasured: tuple[str, ...]
+    contacts: tuple[str, ...]
+    wrenches: tuple[str, ...]
 
     @abstractmethod
     def __len__(self) -> int: ...

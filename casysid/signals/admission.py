@@ -24,6 +24,7 @@ def check_recordings(
     time_scale: float | None = None,
     delay: float | None = None,
     fewest: int = FEWEST,
+    base_is_free: bool = False,
 ) -> None:
     """Nothing, if recordings are long enough to smooth, and what is asked for lies within what they show.
 
@@ -33,13 +34,14 @@ def check_recordings(
         time_scale: Time stamps times this are seconds; None for 1.
         delay: Of the torque [s]; None where it is chosen.
         fewest: Samples in time that each must have.
+        base_is_free: Whether the rows of a free base hold where no torque was measured.
 
     Raises:
         RecordingError: A recording is too short, or lacks the torque of a joint.
         ParameterError: Cut-off, time scale or delay are outside what one can show.
     """
     for recording in recordings:
-        if recording.unmeasured:
+        if recording.unmeasured and not base_is_free:
             locks = " ".join(f"--lock {joint}=VALUE" for joint in recording.unmeasured)
             raise RecordingError(
                 f"{recording.label}: no torque was measured at {', '.join(recording.unmeasured)}, so nothing is known "

@@ -32,6 +32,9 @@ SETTLING = 1.0
 LARGEST_END = 0.05
 """But no more than this share of a stretch counts as one of its ends."""
 
+SAMPLED = ("time", "q", "v", "a", "tau", "standing", "settled", "touching")
+"""Attributes of a motion that have a value for every sample."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
@@ -47,6 +50,9 @@ class Motion:
         standing: Which samples find which degree of freedom standing, shape (N, nv); none where it cannot be known.
         settled: Which samples are away from the ends of stretches of time, shape (N,).
         cutoff: Of the low-pass that the positions went through [Hz]; inf when nothing was filtered.
+        unmeasured: Degrees of freedom without a torque; zeros stand for it.
+        contacts: Frames that touch the world with wrenches that nobody measured.
+        touching: When each of them does, shape (N, contacts); None where there are none.
     """
 
     time: Array
@@ -58,6 +64,9 @@ class Motion:
     standing: npt.NDArray[np.bool_]
     settled: npt.NDArray[np.bool_]
     cutoff: float
+    unmeasured: tuple[str, ...] = ()
+    contacts: tuple[str, ...] = ()
+    touching: npt.NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         for name in ("time", "q", "v", "a", "tau", "velocity_noise"):
@@ -74,7 +83,7 @@ class Motion:
 
     def rows(self, chosen: slice | npt.NDArray[np.bool_]) -> Motion:
         """Some samples only, in the order of time."""
-        kept = ("time", "q", "v", "a", "tau", "standing", "settled")
+        kept = [name for name in SAMPLED if getattr(self, name) is not None]
         return dataclasses.replace(self, **{name: getattr(self, name)[chosen] for name in kept})
 
     def decimated(self, stride: int) -> Motion:
@@ -95,7 +104,13 @@ class Motion:
             tau=self.tau[:whole].reshape(parts).mean(axis=1),
             standing=np.asarray(self.standing[:whole].reshape(parts).any(axis=1)),
             settled=np.asarray(self.settled[:whole].reshape(-1, stride).all(axis=1)),
+            touching=None if self.touching is None else self._touching_ever(whole, stride),
         )
+
+    def _touching_ever(self, whole: int, stride: int) -> npt.NDArray[np.bool_]:
+        """In any of so many samples: what has no contact force loses nothing but equations when it is taken out."""
+        assert self.touching is not None
+        return np.asarray(self.touching[:whole].reshape(-1, stride, len(self.contacts)).any(axis=1))
 
 
 class MotionScales(NamedTuple):
@@ -208,7 +223,7 @@ def joined_motions(parts: list[Motion]) -> Motion:
     """Consecutive motions as one."""
     if len(parts) == 1:
         return parts[0]
-    names = ("time", "q", "v", "a", "tau", "standing", "settled")
+    names = [name for name in SAMPLED if getattr(parts[0], name) is not None]
     together: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
     return dataclasses.replace(parts[0], **together)
 
@@ -255,6 +270,9 @@ def _as_logged(robot: Robot, recording: Recording, first: int) -> Motion:
         standing=np.zeros((count, robot.nv), dtype=bool),
         settled=np.ones(count, dtype=bool),
         cutoff=np.inf,
+        unmeasured=recording.unmeasured,
+        contacts=recording.contacts,
+        touching=recording.touching,
     )
 
 
@@ -298,6 +316,9 @@ class _MotionMaker:
             standing=self._standing(recording, time, moved),
             settled=self._settled(moved, stretch),
             cutoff=self._cutoff,
+            unmeasured=recording.unmeasured,
+            contacts=recording.contacts,
+            touching=None if recording.touching is None else recording.touching[rows],
         )
         mine = slice(int(np.searchsorted(rows, core.start)), int(np.searchsorted(rows, core.stop)))
         return MotionPiece(motion, mine, own, stretch)

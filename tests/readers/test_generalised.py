@@ -102,7 +102,8 @@ def without_names(log):
     [
         (lambda log: log | {"fx_foot": np.zeros(SAMPLES)}, "column 'fx_foot': robot .* has no frame 'foot'"),
         (lambda log: log | {"contact_joint_4": np.zeros(SAMPLES)}, "no frame 'joint_4'; did you mean joint_"),
-        (lambda log: log | {"contact_joint_2": np.zeros(SAMPLES)}, "contact_joint_2: contacts without a wrench"),
+        (lambda log: log | {"contact_joint_2": np.full(SAMPLES, 0.5)}, "'contact_joint_2' must be 1 while .* got 0.5"),
+        (lambda log: log | {"contact": np.zeros(SAMPLES)}, "column 'contact' says of no frame that it touches"),
         (lambda log: log | {"world_fx_joint_3_link": np.zeros(SAMPLES)}, "along the world's axes and along its own"),
         (
             lambda log: log | {"fz_joint_3_link": np.where(np.arange(SAMPLES) == 7, np.nan, 1.0)},
