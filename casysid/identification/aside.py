@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from casysid.arrays import Array
-from casysid.dynamics import Regressor
+from casysid.dynamics import Counterweight, LoadedCoulomb, Regressor, Ripple, Spring
 from casysid.errors import SolverError
 from casysid.estimation import Ridge
 from casysid.estimation.cross_validation import contiguous_folds
@@ -19,6 +19,8 @@ FOLDS = 5
 """Of cross-validation."""
 UNEXPLAINED = 0.75
 """Share of a joint's varying torque (roots of energies) beyond which nothing explains it."""
+LIKE_WEIGHT = (LoadedCoulomb, Spring, Counterweight, Ripple)
+"""Kinds whose torque goes with the configuration as that of links does."""
 SILENT = 1e-6
 """Share of its own size that torque varies by which was not measured."""
 
@@ -49,9 +51,16 @@ def unexplained_joints(moments: Moments, regressor: Regressor) -> tuple[str, ...
 
 
 def gains_of_the_rest(moments: Moments, regressor: Regressor, settings: Settings) -> DriveGains:
-    """Gains that the joints call for that something explains; one for the others."""
-    asked = (regressor.parameters, settings.consistency, settings.knowledge, settings.torque_gains)
+    """Gains that the joints call for that something explains; one for the others.
+
+    Kinds of friction and transmission whose torque is like the weight of links are left out: scaled torques look like
+    them.
+    """
     aside = unexplained_joints(moments, regressor) if settings.torque_gains is None else ()
+    alike = {c for part in regressor.parts if isinstance(part.kind, LIKE_WEIGHT) for c in part.columns}
+    columns = np.array([column for column in range(len(regressor.names)) if column not in alike])
+    moments, parameters = moments.select_columns(columns), [regressor.parameters[column] for column in columns]
+    asked = (parameters, settings.consistency, settings.knowledge, settings.torque_gains)
     if not aside:
         return choose_drive_gains(moments, *asked)
     moving = moments.away_from_rest()

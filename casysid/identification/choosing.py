@@ -1,7 +1,7 @@
-"""All that the data choose before a method is asked: band, clock, signs, delay, gains and friction, in this order.
+"""All that the data choose before a method is asked: band, clock, signs, delay, friction and gains, in this order.
 
-Gains come before further kinds of friction: a spring, a counterweight or friction that grows with the load takes part
-of what a wrong gain leaves.
+Gains are judged without springs, counterweights and friction that grows with the load: these take part of what a wrong
+gain leaves.
 """
 
 from __future__ import annotations
@@ -80,11 +80,6 @@ def choose(
         candidates = with_torque_gains(candidates, passes, measured)
     progress("tuning", 0.5)
     delay = choose_delay(passes, candidates.base, settings.delay)
-    gains = gains_of_the_rest(candidates.moments.select_columns(candidates.model()), candidates.base, settings)
-    if gains.found:
-        warnings.warn(gains.reason, CasysidWarning, stacklevel=4)
-        measured = _with_gains(settings, gains.values * signs)
-        candidates = with_torque_gains(candidates, passes, measured)
     usual = fit_model(candidates, candidates.model(), measured) if candidates.proposals else None
     uses = None if usual is None else ripple_uses(passes, candidates, usual.estimate)
     if uses or not delay.is_none:
@@ -93,6 +88,12 @@ def choose(
     progress("tuning", 0.7)
     friction = select_friction(candidates, measured, usual) if usual else FrictionChoice(measured)
     regressor = final_regressor(candidates, measured, [proposal for proposal, _ in friction.taken])
+    gains = gains_of_the_rest(moments_of(regressor, candidates, friction.taken), regressor, settings)
+    if gains.found:
+        warnings.warn(gains.reason, CasysidWarning, stacklevel=4)
+        measured = _with_gains(settings, gains.values * signs)
+        candidates = with_torque_gains(candidates, passes, measured, uses)
+        regressor = final_regressor(candidates, measured, [proposal for proposal, _ in friction.taken])
     moments = moments_of(regressor, candidates, friction.taken)
     friction = dataclasses.replace(
         friction,

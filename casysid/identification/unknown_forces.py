@@ -112,7 +112,7 @@ def moments_of_known(
 
 def with_noise_of_known(estimate: Estimate, moments: Moments) -> Estimate:
     """The estimate, with noise of one where no equation tells it: whatever weighs such rows weighs zeros."""
-    known = moments.count.any(axis=0)
+    known = np.asarray(moments.count.any(axis=0))
     if known.all() or len(known) != len(estimate.noise_std):
         return estimate
     return dataclasses.replace(estimate, noise_std=np.where(known, estimate.noise_std, 1.0))

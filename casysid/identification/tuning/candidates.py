@@ -132,9 +132,11 @@ def gather_candidates(passes: Passes, settings: Settings, uses: Mapping[int, Joi
     return Candidates(moments=passes.moments(columns.regressor), **columns._asdict())
 
 
-def with_torque_gains(candidates: Candidates, passes: Passes, settings: Settings) -> Candidates:
+def with_torque_gains(
+    candidates: Candidates, passes: Passes, settings: Settings, uses: Mapping[int, JointUse] | None = None
+) -> Candidates:
     """The same for other gains of the joints' torques, without a pass; ``settings`` as they were but for these."""
-    columns, moments = _columns(passes, settings), candidates.moments
+    columns, moments = _columns(passes, settings, uses), candidates.moments
     before, after = (one.template.sensing.gains for one in (candidates.regressor, columns.regressor))
     dofs = [passes.robot.dofs.index(moments.joints[row]) for row in moments.moving_rows]
     factors = np.array(after)[dofs] / np.array(before)[dofs]
