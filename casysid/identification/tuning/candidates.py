@@ -112,8 +112,8 @@ def usual_friction(passes: Passes, settings: Settings) -> tuple[FrictionKind, ..
     }
     displacements = {name: tuple(several) for name, several in clear.items() if several}
     usual: list[FrictionKind] = [SharpCoulomb(tuple((passes.width / SHARPER).tolist()))]
-    if loaded := _loaded(passes):
-        usual.append(LoadedCoulomb(width, tuple(directions[dof].name for dof in loaded)))
+    if loaded := [directions[dof].name for dof in _loaded(passes) if dof in directions]:
+        usual.append(LoadedCoulomb(width, tuple(loaded)))
     if displacements:
         usual.append(MaxwellSlip(displacements))
     there = [one.kind for one in friction]
