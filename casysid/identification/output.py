@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
+from casysid.dynamics import Regressor
 from casysid.identification.plain_friction import homeless_columns
 from casysid.identification.result import IdentificationResult, without_infinities
 from casysid.identification.verdict import judge
@@ -75,6 +77,17 @@ def model_path(result: IdentificationResult, directory: Path) -> Path:
     return directory / ("identified.urdf" if result.robot.source_format == "urdf" else "identified.xml")
 
 
+def _in_kinds(regressor: Regressor, columns: Sequence[str]) -> str:
+    """Drive columns by their kinds, such as ``stribeck (2 joints)``; names of joints where there is one."""
+    owners: dict[str, list[str]] = {}
+    for part in regressor.parts:
+        if any(regressor.names[column] in columns for column in part.columns):
+            owners.setdefault(part.kind.kind.replace("_", " "), []).append(part.direction.name)
+    return ", ".join(
+        f"{kind} ({names[0] if len(names) == 1 else f'{len(names)} joints'})" for kind, names in owners.items()
+    )
+
+
 def _write_model(result: IdentificationResult, stage: Stage, export_inconsistent: bool) -> tuple[str, ...]:
     path = model_path(result, stage.home)
     if not (result.is_physically_consistent or export_inconsistent):
@@ -92,7 +105,7 @@ def _write_model(result: IdentificationResult, stage: Stage, export_inconsistent
     if not homeless:
         return written.notes
     note = (
-        f"{path.name} has no place for {', '.join(homeless)}: they are in result.json, under friction; the file's "
-        "viscous and Coulomb friction are those that come nearest to the whole."
+        f"{path.name} has no place for {_in_kinds(result.regressor, homeless)}: they are in result.json, under "
+        "friction; the file's viscous and Coulomb friction are those that come nearest to the whole."
     )
     return (*written.notes, note)

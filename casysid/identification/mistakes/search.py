@@ -72,7 +72,7 @@ def find_mistakes(robot: Robot, motions: Sequence[Motion], cutoff: float | None)
     Joints of several degrees of freedom, and robots of very many, are taken as logged. A change that no torque tells,
     as another zero of a joint with a vertical axis at the base, cannot be found.
     """
-    if robot.nv > MOST_DOFS:
+    if robot.nv > MOST_DOFS or not any(joint.kind in MOVING for joint in robot.joints):
         return ()
     search = _Search(robot, motions, cutoff)
     found: list[Mistake] = []
