@@ -34,7 +34,7 @@ WIDEST = 2.0
 """Radius of gyration over the link's length: a rod of it would be seven links long."""
 FARTHEST = 5.0
 """Distance of the centre of mass from the joint over the link's length, or its radius of gyration if that is more."""
-HEAVIEST, SOLID = 10.0, 5_000.0
+HEAVIEST, SOLID = 10.0, 20_000.0
 """Mass over that of all other links together, of what besides is so dense [kg/m³] even as a ball: no mobile base is."""
 GRAMS = 1e3
 """In a kilogram: equal parts of which one's mass is in grams are equal parts."""

@@ -41,10 +41,10 @@ def test_what_is_counted_is_what_is_done(monkeypatch):
     smoothed, summed = [], []
     modules = "casysid.identification.passes"
     motion, moments = (
-        __import__(modules, fromlist=[name]).__dict__[name] for name in ("motion_from_recording", "accumulate_moments")
+        __import__(modules, fromlist=[name]).__dict__[name] for name in ("motion_from_recording", "moments_of_known")
     )
     monkeypatch.setattr(f"{modules}.motion_from_recording", lambda *a, **k: smoothed.append(1) or motion(*a, **k))
-    monkeypatch.setattr(f"{modules}.accumulate_moments", lambda *a, **k: summed.append(1) or moments(*a, **k))
+    monkeypatch.setattr(f"{modules}.moments_of_known", lambda *a, **k: summed.append(1) or moments(*a, **k))
     recording = simulated_run("two_link.urdf", 0, PlantSettings()).recording
     choices = prepare(bundled_robot("two_link.urdf"), recording, Settings(delay=0.0)).choices
     assert len(smoothed) == choices.smoothings

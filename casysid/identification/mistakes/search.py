@@ -124,7 +124,7 @@ class _Search:
         """The clearest mistake, corrected in the samples from now on; None when there is no clear one."""
         fit = GravityFit(self._robot, self._samples, self._gravity)
         turned = fit.found() if self._gravity is None else None
-        readings = [*([] if turned is None else [self._turned(turned)]), *self._single(fit.file)]
+        readings = [*self._turned(fit.file, turned), *self._single(fit.file)]
         explained = _is_near(fit.file, EXPLAINED) or any(_is_near(one.bodies, EXPLAINED_SO) for one in readings)
         if not explained and 1 < len(self._joints) <= MOST_ORDERED:
             readings += self._permuted(fit.file)
@@ -206,8 +206,16 @@ class _Search:
             if likelier or bodies.cost < now.cost - CLEAR_ABSENCE:
                 yield _Reading(mistake, read, self._gravity, bodies, bodies.cost)
 
-    def _turned(self, choice: GravityChoice) -> _Reading:
-        """The samples in another gravity; of one along no axis more is asked than of other readings."""
+    def _turned(self, now: GravityChoice, choice: GravityChoice | None) -> Iterator[_Reading]:
+        """The samples in another gravity, where it brings bodies nearer to the file's, and its prediction to the log.
+
+        Of one along no axis more is asked than of other readings.
+        """
+        if choice is None or choice.strain > now.strain or float(np.mean(choice.unexplained)) > EXPLAINED_SO:
+            return
+        gain, steadiness = gain_of(self._now, self._witness.explain(self._samples, choice.gravity))
+        if gain <= 0.0 or steadiness <= STEADY:
+            return
         file, gravity = self._robot.gravity, choice.gravity
         mistake = Mistake(
             kind=MistakeKind.GRAVITY_TURNED if gravity.any() else MistakeKind.GRAVITY_ABSENT,
@@ -216,7 +224,7 @@ class _Search:
             gravity=tuple(gravity.tolist()),
         )
         price = CLEAR_ABSENCE if np.count_nonzero(gravity) > 1 else 0.0
-        return _Reading(mistake, self._samples, gravity, choice, choice.cost + price)
+        yield _Reading(mistake, self._samples, gravity, choice, choice.cost + price)
 
     def _is_convincing(self, reading: _Reading) -> bool:
         """Whether bodies explain the joints concerned, so read."""
