@@ -18,7 +18,7 @@ from casysid.dynamics import JointUse, Regressor
 from casysid.errors import CasysidWarning
 from casysid.identification.aside import gains_of_the_rest
 from casysid.identification.choices import Choices
-from casysid.identification.mistakes import find_mistakes, torque_signs
+from casysid.identification.mistakes import MOST_DOFS, find_mistakes, torque_signs
 from casysid.identification.passes import Mapped, Passes, excerpts, is_long
 from casysid.identification.settings import Settings
 from casysid.identification.tuning.band import BandChoice, choose_band
@@ -57,6 +57,7 @@ def choose(
     robot: Robot, recordings: Sequence[Source], settings: Settings, progress: Progress, mapped: Mapped
 ) -> Chosen:
     """Band, clock, delay, friction and gains, each given those before; recordings are smoothed anew for a new clock."""
+    settings = _within_reach(robot, recordings, settings)
     whole, recordings = recordings, excerpts(recordings, mapped)
     band = choose_band(whole, settings.cutoff)
     passes, candidates = _gather(robot, recordings, band, settings)
@@ -74,7 +75,7 @@ def choose(
     mistakes = () if has_unknown_forces(recordings) else find_mistakes(robot, passes.sparse_motions, band.cutoff)
     for mistake in mistakes:
         warnings.warn(mistake.sentence, CasysidWarning, stacklevel=4)
-    signs = np.ones(robot.nv) if settings.torque_gains else torque_signs(mistakes, robot.dofs)
+    signs = np.ones(robot.nv) if settings.torque_gains is not None else torque_signs(mistakes, robot.dofs)
     measured = _with_gains(settings, signs)
     if (signs < 0.0).any():
         candidates = with_torque_gains(candidates, passes, measured)
@@ -126,6 +127,22 @@ def choose(
         equations=describe_equations(robot, whole),
     )
     return Chosen(choices, regressor, moments, passes, looked_at)
+
+
+def _within_reach(robot: Robot, recordings: Sequence[Source], settings: Settings) -> Settings:
+    """With nothing left to searches whose memory and time grow with the cube of the joints, and said."""
+    if robot.nv <= MOST_DOFS or not (settings.choose_friction or settings.delay is None):
+        return settings
+    warnings.warn(
+        f"{robot.name}: of a robot with {robot.nv} degrees of freedom, more than {MOST_DOFS}, neither mistakes of the "
+        "log nor the torque's delay and further kinds of friction are looked for; identify a part of it with the rest "
+        "held by --lock to have them",
+        CasysidWarning,
+        stacklevel=5,
+    )
+    timed = all(one.has_time for one in recordings)
+    delay = 0.0 if settings.delay is None and timed else settings.delay
+    return dataclasses.replace(settings, choose_friction=False, delay=delay, torque_gains=(1.0,) * robot.nv)
 
 
 def _with_gains(settings: Settings, gains: Array) -> Settings:

@@ -154,7 +154,7 @@ def test_the_choice_pays_on_unseen_data(result):
 
 def test_result_json_rebuilds_the_whole_model(result, tmp_path):
     notes = write_result(result, tmp_path)
-    assert any("no place for" in note and "shoulder.stiffness" in note for note in notes)
+    assert any("no place for" in note and "stiffness (shoulder)" in note for note in notes)
     earlier = read_earlier_result(tmp_path / "result.json")
     robot, unseen = Robot.from_file(tmp_path / "identified.urdf"), SPRUNG[1]
     again = validate(robot, [unseen], earlier=earlier)
