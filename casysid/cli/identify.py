@@ -188,13 +188,16 @@ def tell_result(console: Console, result: IdentificationResult, notes: tuple[str
     """The tables, the verdict, and what else a person should know."""
     from casysid.cli.console import rich_table, say
     from casysid.identification.verdict import judge
-    from casysid.report import drive_table, error_table, link_table, noise_table
+    from casysid.report import drive_table, error_table, further_drive_table, link_table, noise_table
 
     for title, table in (
         ("Torque error", error_table(result)),
         ("Friction and drive", drive_table(result)),
+        ("Beside it", further_drive_table(result)),
         ("Links", link_table(result)),
     ):
+        if not table.rows:
+            continue
         console.print(rich_table(title, table.header, table.rows))
         console.print()
     if result.choices.equations:

@@ -18,6 +18,7 @@ from casysid.report.tables import (
     choice_table,
     drive_table,
     error_table,
+    further_drive_table,
     link_table,
     mistake_table,
     source_table,
@@ -136,6 +137,10 @@ def _sections(result: IdentificationResult) -> list[Section]:
             lines=(", ".join(result.sources.of_the_file),),
         ),
     ]
+    further = further_drive_table(result)
+    if further.rows:
+        words = "Beside the plain kinds; what is within its standard error of zero is left out."
+        sections.append(Section("Further friction and transmission", words, table=further))
     if result.friction.chosen:
         words = f"Of {result.friction.asked} candidates; errors in cross-validation over stretches of time."
         sections.append(Section("Choice of friction", words, table=choice_table(result)))
@@ -144,7 +149,8 @@ def _sections(result: IdentificationResult) -> list[Section]:
             0,
             Section(
                 "The log against the model file",
-                "Signs, units or orders of columns that would explain the log far better. Nothing was changed for it.",
+                "Signs, units or orders of columns that would explain the log far better. A torque that clearly has "
+                "the other sign was taken so; nothing else was changed.",
                 table=mistake_table(result.mistakes),
             ),
         )

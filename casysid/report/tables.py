@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 from casysid.dynamics import Coulomb
 from casysid.dynamics.friction import force_unit, joint_directions
@@ -154,24 +155,31 @@ def _range(shares: list[float]) -> str:
 
 
 def drive_table(result: IdentificationResult) -> Table:
-    """Friction, offset and armature by joint and coupling, with standard errors; all dry friction as one number."""
+    """Viscous friction, offset and armature by joint and coupling, with standard errors; dry friction as one number."""
     table, std, dry = result.drive_parameters(), result.drive_std(), result.dry_friction()
     units: dict[str, set[str]] = {}
     for parameter in result.regressor.parameters[10 * len(result.robot.links) :]:
         units.setdefault(parameter.kind, set()).add(parameter.unit)
     there = {kind for row in table.values() for kind, value in row.items() if value is not None}
-    others = sorted(kind for kind in there - set(JOINT_KINDS) if not is_dry(kind))
     usual = [kind for kind in JOINT_KINDS if kind in there and kind != Coulomb.kind]
     rows = tuple(
-        (
-            owner,
-            number(dry[owner], 3),
-            *(with_error(row.get(kind), std[owner].get(kind)) for kind in (*usual, *others)),
-        )
+        (owner, number(dry[owner], 3), *(with_error(row.get(kind), std[owner].get(kind)) for kind in usual))
         for owner, row in table.items()
     )
-    titles = [f"{kind} [{', '.join(sorted(units.get(kind, {''})))}]" for kind in (*usual, *others)]
+    titles = [f"{kind} [{', '.join(sorted(units.get(kind, {''})))}]" for kind in usual]
     return Table(("joint", f"dry [{torque_units(result.robot)}]", *titles), rows)
+
+
+def further_drive_table(result: IdentificationResult) -> Table:
+    """All other friction and transmission, a parameter a row; what is within its standard error of zero is left out."""
+    first = 10 * len(result.robot.links)
+    shown = zip(result.regressor.parameters, result.parameters, result.uncertainty.std, strict=True)
+    rows = tuple(
+        (parameter.owner, parameter.kind, with_error(float(value), float(std)), parameter.unit)
+        for parameter, value, std in islice(shown, first, None)
+        if parameter.kind not in JOINT_KINDS and not is_dry(parameter.kind) and abs(value) > std
+    )
+    return Table(("joint", "further friction and transmission", "value", "unit"), rows)
 
 
 def choice_table(result: IdentificationResult) -> Table:

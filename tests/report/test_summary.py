@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from casysid.identification import Settings, identify
-from casysid.report import drive_table, link_table, render_report
+from casysid.identification.result import JOINT_KINDS, is_dry
+from casysid.report import drive_table, further_drive_table, link_table, render_report
 from casysid.report.summary import Origin, base_parameter_table, base_parameters, summary_sentences
 from casysid.report.tables import as_sure, with_error
 from casysid.simulation import PlantSettings
@@ -51,6 +52,17 @@ def test_numbers_have_no_more_digits_than_they_are_known_by(result):
     drives = drive_table(result)
     assert drives.header[1:3] == ("dry [N m]", "viscous [N m s/rad]")
     assert all("±" in row[2] for row in drives.rows)
+
+
+def test_a_drive_table_is_narrow_and_all_else_has_a_row(result):
+    assert {title.split(" [")[0] for title in drive_table(result).header} <= {"joint", "dry", *JOINT_KINDS}
+    values = dict(zip(result.regressor.names, zip(result.parameters, result.uncertainty.std, strict=True), strict=True))
+    shown = {f"{owner}.{kind}" for owner, kind, *_ in further_drive_table(result).rows}
+    assert all(abs(values[name][0]) > values[name][1] for name in shown)
+    others = [p.name for p in result.regressor.parameters[10 * len(result.robot.links) :]]
+    told = {name for name in others if abs(values[name][0]) > values[name][1]}
+    plain = {name for name in others if is_dry(name.split(".", 1)[1]) or name.split(".", 1)[1] in JOINT_KINDS}
+    assert shown == told - plain
 
 
 def test_the_report_names_inputs_settings_and_command(result, tmp_path):
