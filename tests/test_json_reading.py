@@ -69,3 +69,13 @@ def test_a_whole_result_is_read(tmp_path):
     assert earlier.delays == {"shoulder": 0.002}
     assert earlier.torque_gains == {"shoulder": 1.1}
     assert earlier.friction is not None
+    assert read_earlier_result(tmp_path).drives == earlier.drives
+
+
+def test_a_torque_that_was_logged_with_the_other_sign_has_a_negative_gain(tmp_path):
+    path = tmp_path / "result.json"
+    path.write_text(json.dumps({**GOOD, "torque_gains": {"gains": {"shoulder": -1.1}}}))
+    assert read_earlier_result(path).torque_gains == {"shoulder": -1.1}
+    path.write_text(json.dumps({**GOOD, "torque_gains": {"gains": {"shoulder": 0.0}}}))
+    with pytest.raises(ParameterError, match=r"torque_gains\.gains\.shoulder"):
+        read_earlier_result(path)

@@ -48,13 +48,15 @@ class EarlierResult:
 
 
 def read_earlier_result(path: str | Path) -> EarlierResult:
-    """The part of a ``result.json`` that :class:`EarlierResult` holds.
+    """The part of a ``result.json`` that :class:`EarlierResult` holds; the folder it lies in will do.
 
     Raises:
         ParameterError: The file is not such a result, or its columns of friction are not casysid's own.
     """
+    path = Path(path)
+    path = path / "result.json" if path.is_dir() else path
     try:
-        content = read_json(Path(path))
+        content = read_json(path)
         clock = object_at(content, "time_base")
         check_numbers(object_at(content, "friction_model"), "friction_model")
         return EarlierResult(
