@@ -36,7 +36,7 @@ def validate(
         typer.Option(
             "--result",
             metavar="FILE",
-            help="A result.json or its folder: its friction, offset, armature, and how it read recordings, which URDF cannot hold.",
+            help="A result.json or its folder: its drives, and how it read recordings, which URDF cannot hold.",
         ),
     ] = None,
     flip: FlipOption = None,
