@@ -41,6 +41,7 @@ NO_DOORS = {
     "error_table": "words only",
     "find_model": "a path",
     "find_way": "distances and vectors only",
+    "further_drive_table": "words only",
     "generate_c": "symbols only",
     "keep_in": "symbols only",
     "limits_of": "vectors only",
